@@ -1,0 +1,37 @@
+"""Known trouble, as one tree of exceptions.
+
+Every message names the file, topic or field, what was expected, what was found and the remedy, in one line; the
+command line prints it and exits with 1. Anything else that is raised is a bug and keeps its traceback.
+"""
+
+
+class NavirlError(Exception):
+    """Base of all trouble that navirl expects and can explain."""
+
+
+class LogError(NavirlError):
+    """A log cannot be read, or does not hold what is needed."""
+
+
+class FrameError(LogError):
+    """A transform between two frames is missing."""
+
+
+class DemonstrationError(NavirlError):
+    """A trial cannot become a demonstration, or a demonstration contradicts itself."""
+
+
+class GridError(NavirlError):
+    """A map or a cell does not fit."""
+
+
+class SceneError(NavirlError):
+    """A scene has no path from start to goal, or a person where none can stand."""
+
+
+class RewardError(NavirlError):
+    """A reward, a parameter or a fit cannot be used."""
+
+
+class ArtefactError(NavirlError):
+    """A file that navirl reads or writes is missing, exists already or breaks its schema."""

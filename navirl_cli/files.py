@@ -1,0 +1,49 @@
+"""Files that appear whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from navirl_cli.errors import ArtefactError
+
+
+@contextmanager
+def replacing(path: Path, *, force: bool) -> Iterator[Path]:
+    """Write a file under a temporary name in the same folder and rename it when the block ends well.
+
+    Args:
+        path: The file to be.
+        force: Whether an existing file may be replaced.
+
+    Yields:
+        The temporary name. After an exception nothing is left of it.
+
+    Raises:
+        ArtefactError: The file exists and may not be replaced, or its folder is missing or cannot be written.
+    """
+    check_writable(path, force=force)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def check_writable(path: Path, *, force: bool) -> None:
+    """Refuse early what could not be written at the end of a long computation.
+
+    Raises:
+        ArtefactError: As in :func:`replacing`.
+    """
+    if path.is_dir():
+        raise ArtefactError(f"{path}: expected the name of a file to write, found a folder; name a file in it")
+    if path.exists() and not force:
+        raise ArtefactError(f"{path}: exists already; give another name, or --force to replace it")
+    if not path.parent.is_dir():
+        raise ArtefactError(f"{path}: expected an existing folder, found none at {path.parent}; create it")
+    if not os.access(path.parent, os.W_OK):
+        raise ArtefactError(f"{path}: the folder {path.parent} cannot be written; choose another with -o")

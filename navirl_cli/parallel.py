@@ -1,0 +1,32 @@
+"""Work over many logs or fits, through one function that any executor can stand behind."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from os import cpu_count
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def map_in_order(
+    function: Callable[[Item], Result], items: Sequence[Item], executor: Executor | None = None
+) -> Iterator[Result]:
+    """Apply a function to every item, in other processes where that can pay, and yield results in order.
+
+    Args:
+        function: Importable by name; what it takes and returns crosses process borders.
+        items: The work.
+        executor: Where to run; by default local processes, or this process for a single item.
+
+    Yields:
+        Results in the order of the items.
+    """
+    workers = min(len(items), cpu_count() or 1)
+    if executor is not None:
+        yield from executor.map(function, items)
+    elif workers < 2:
+        yield from map(function, items)
+    else:
+        with ProcessPoolExecutor(workers) as pool:
+            yield from pool.map(function, items)
