@@ -1,0 +1,89 @@
+"""A log as an extraction needs it: poses in the fixed frame, raw forces, people, goals, commands and the map."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.errors import LogError
+
+#: Name of the metadata record in which a log says what only the experimenter knows: keys "participant" (a name) and
+#: "trials" (JSON: a list of objects with "t_ns", the time of the trial's goal, and "cycle" and "condition").
+SESSION_RECORD = "navirl.session"
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """Force measurements in the sensor's frame."""
+
+    #: (n,) ns, increasing.
+    t_ns: IntArray
+    #: (n, 3) N, sensor frame, as measured.
+    force_n: FloatArray
+    #: (3, 3) rotation that turns a vector of the sensor frame into the robot's base frame.
+    to_base: FloatArray
+
+
+@dataclass(frozen=True)
+class Occupancy:
+    """A map as nav_msgs/OccupancyGrid holds it."""
+
+    #: (rows, columns) -1 unknown, 0..100 per cent; row 0 has the lowest y.
+    data: NDArray[np.int8]
+    resolution_m: float
+    #: Lower left corner, (x, y) m, fixed frame.
+    origin_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What the experimenter's protocol says of the trial that starts at a time."""
+
+    t_ns: int
+    cycle: int | None = None
+    condition: str | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything of one log, on one clock and in one fixed frame."""
+
+    #: File name of the log.
+    log: str
+    #: Name from the session record, or None.
+    participant: str | None
+    #: (n,) ns, increasing: the robot's poses in the fixed frame.
+    t_ns: IntArray
+    #: (n, 2) m and (n,) rad, fixed frame.
+    xy_m: FloatArray
+    yaw_rad: FloatArray
+    wrench: Wrench | None
+    occupancy: Occupancy
+    #: (g,) ns and (g, 2) m, fixed frame.
+    goal_t_ns: IntArray
+    goal_m: FloatArray
+    #: By message: ns, and (p, 2) m, fixed frame.
+    people_t_ns: IntArray
+    people_m: tuple[FloatArray, ...]
+    #: (c,) ns and (c,) largest deflection of the joystick, 0..1.
+    command_t_ns: IntArray
+    command: FloatArray
+    declared: tuple[Declared, ...] = ()
+    #: What could not be read, in words.
+    damage: tuple[str, ...] = field(default=())
+    #: What is odd about the log, in words.
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Check shapes and that time runs forward."""
+        if len(self.t_ns) < 2:
+            raise LogError(f"{self.log}: expected poses of a moving robot, found {len(self.t_ns)}")
+        if not (np.diff(self.t_ns) > 0).all():
+            raise LogError(f"{self.log}: pose times must increase")
+        if self.xy_m.shape != (len(self.t_ns), 2) or self.yaw_rad.shape != self.t_ns.shape:
+            raise LogError(
+                f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
+            )

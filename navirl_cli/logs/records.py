@@ -1,0 +1,262 @@
+"""MCAP records: their codes and their contents, parsed from bytes.
+
+Source: the MCAP file format specification, https://mcap.dev/spec. Only what reading needs is kept of each record.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+
+HEADER: Final = 0x01
+FOOTER: Final = 0x02
+SCHEMA: Final = 0x03
+CHANNEL: Final = 0x04
+MESSAGE: Final = 0x05
+CHUNK: Final = 0x06
+MESSAGE_INDEX: Final = 0x07
+CHUNK_INDEX: Final = 0x08
+ATTACHMENT: Final = 0x09
+STATISTICS: Final = 0x0B
+METADATA: Final = 0x0C
+METADATA_INDEX: Final = 0x0D
+DATA_END: Final = 0x0F
+#: Codes from here on are free for private use: skipped, never an error.
+PRIVATE: Final = 0x80
+
+#: Bytes of a record's code and length.
+HEAD_SIZE: Final = 9
+#: Bytes from the start of a message record to its payload.
+MESSAGE_HEAD_SIZE: Final = 31
+#: Bytes of footer record and magic, which close every complete file.
+TAIL_SIZE: Final = HEAD_SIZE + 20 + len(MAGIC)
+
+#: What a parser raises on contents that are no such record.
+MALFORMED: Final = (struct.error, ValueError)
+
+RECORD_HEAD: Final = struct.Struct("<BQ")
+_MESSAGE_START: Final = struct.Struct("<QH")
+
+#: The start of a message record, to be gathered at many offsets at once.
+MESSAGE_HEAD: Final = np.dtype(
+    {
+        "names": ["op", "length", "channel", "log_time"],
+        "formats": ["u1", "<u8", "<u2", "<i8"],
+        "offsets": [0, 1, 9, 15],
+        "itemsize": MESSAGE_HEAD_SIZE,
+    }
+)
+
+IntArray = NDArray[np.int64]
+
+
+class SchemaRecord(NamedTuple):
+    """The definition of a message type."""
+
+    id: int
+    name: str
+    encoding: str
+    text: str
+
+
+class ChannelRecord(NamedTuple):
+    """A topic and how its messages are encoded."""
+
+    id: int
+    schema_id: int
+    topic: str
+    message_encoding: str
+
+
+class ChunkHead(NamedTuple):
+    """What stands before a chunk's compressed bytes."""
+
+    size: int
+    crc: int
+    compression: str
+    data_start: int
+    data_size: int
+
+
+class ChunkIndex(NamedTuple):
+    """Where a chunk and its message indexes stand in the file."""
+
+    start: int
+    length: int
+    message_indexes: dict[int, int]
+    message_index_length: int
+
+    @property
+    def stop(self) -> int:
+        """First byte behind the chunk and its message indexes."""
+        return self.start + self.length + self.message_index_length
+
+
+class Statistics(NamedTuple):
+    """Counts over the whole file."""
+
+    messages: int
+    channels: int
+    metadata: int
+    chunks: int
+    start_ns: int
+    end_ns: int
+    by_channel: dict[int, int]
+
+
+class Footer(NamedTuple):
+    """Where the summary section starts (0: none) and its CRC (0: none)."""
+
+    summary_start: int
+    summary_crc: int
+
+
+@dataclass
+class _Cursor:
+    """Reads one value after the other from a record's contents."""
+
+    data: bytes | memoryview
+    at: int = 0
+
+    def take(self, layout: str) -> tuple[int, ...]:
+        values: tuple[int, ...] = struct.unpack_from(layout, self.data, self.at)
+        self.at += struct.calcsize(layout)
+        return values
+
+    def string(self) -> str:
+        return self.blob().decode()
+
+    def blob(self) -> bytes:
+        (size,) = self.take("<I")
+        if self.at + size > len(self.data):
+            raise ValueError(f"a text of {size} bytes does not fit into a record of {len(self.data)} bytes")
+        self.at += size
+        return bytes(self.data[self.at - size : self.at])
+
+    def integers(self) -> dict[int, int]:
+        return dict(struct.iter_unpack("<HQ", self.blob()))
+
+
+def parse_header(content: bytes) -> tuple[str, str]:
+    """Profile and library of a header record."""
+    cursor = _Cursor(content)
+    return cursor.string(), cursor.string()
+
+
+def parse_schema(content: bytes) -> SchemaRecord:
+    """A schema record; bytes of its text that are no UTF-8 (comments, mostly) are replaced."""
+    cursor = _Cursor(content)
+    (schema_id,) = cursor.take("<H")
+    return SchemaRecord(schema_id, cursor.string(), cursor.string(), cursor.blob().decode(errors="replace"))
+
+
+def parse_channel(content: bytes) -> ChannelRecord:
+    """A channel record without its metadata."""
+    cursor = _Cursor(content)
+    channel_id, schema_id = cursor.take("<HH")
+    return ChannelRecord(channel_id, schema_id, cursor.string(), cursor.string())
+
+
+def parse_chunk_head(content: bytes | memoryview) -> ChunkHead:
+    """The start of a chunk record; `data_start` counts from the start of the contents."""
+    cursor = _Cursor(content)
+    _, _, size, crc = cursor.take("<QQQI")
+    compression = cursor.string()
+    (data_size,) = cursor.take("<Q")
+    return ChunkHead(size, crc, compression, cursor.at, data_size)
+
+
+def parse_chunk_index(content: bytes) -> ChunkIndex:
+    """A chunk index record."""
+    cursor = _Cursor(content)
+    _, _, start, length = cursor.take("<QQQQ")
+    indexes = cursor.integers()
+    (index_length,) = cursor.take("<Q")
+    return ChunkIndex(start, length, indexes, index_length)
+
+
+def parse_statistics(content: bytes) -> Statistics:
+    """A statistics record."""
+    cursor = _Cursor(content)
+    messages, _, channels, _, metadata, chunks, start_ns, end_ns = cursor.take("<QHIIIIQQ")
+    return Statistics(messages, channels, metadata, chunks, start_ns, end_ns, cursor.integers())
+
+
+def parse_metadata(content: bytes) -> tuple[str, dict[str, str]]:
+    """Name and entries of a metadata record."""
+    cursor = _Cursor(content)
+    name = cursor.string()
+    entries = _Cursor(cursor.blob())
+    values: dict[str, str] = {}
+    while entries.at < len(entries.data):
+        key = entries.string()
+        values[key] = entries.string()
+    return name, values
+
+
+def parse_metadata_index(content: bytes) -> int:
+    """Offset in the file of the metadata record that a metadata index record points to."""
+    (offset,) = _Cursor(content).take("<Q")
+    return offset
+
+
+def parse_footer(content: bytes) -> Footer:
+    """A footer record."""
+    summary_start, _, crc = _Cursor(content).take("<QQI")
+    return Footer(summary_start, crc)
+
+
+def parse_message_index(content: bytes) -> IntArray:
+    """Offsets of a channel's messages in its uncompressed chunk, ascending, shape (n,)."""
+    entries = np.frombuffer(_Cursor(content, 2).blob(), dtype="<u8")
+    return np.sort(entries.reshape(-1, 2)[:, 1].astype(np.int64))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a walk over records in a buffer met."""
+
+    #: Offsets of the message records, by channel id, ascending.
+    messages: dict[int, list[int]]
+    #: Code, first and last byte + 1 of the contents of schema and channel records.
+    definitions: list[tuple[int, int, int]]
+    #: Offset at which the walk stopped: the buffer's size, or the first record that is cut or none of the three.
+    stop: int
+
+
+def walk(data: bytes, limit: int) -> Found:
+    """Hop from record to record over messages, schemas and channels.
+
+    Args:
+        data: Records, from the first byte on.
+        limit: Bytes of `data` to walk over.
+
+    Returns:
+        What was found; `stop` is smaller than `limit` if a record is cut or of another kind.
+    """
+    messages: dict[int, list[int]] = {}
+    definitions: list[tuple[int, int, int]] = []
+    at = 0
+    unpack = _MESSAGE_START.unpack_from
+    last = limit - HEAD_SIZE
+    while at <= last:
+        code = data[at]
+        if code == MESSAGE and at + MESSAGE_HEAD_SIZE <= limit:
+            length, channel = unpack(data, at + 1)
+            if length < MESSAGE_HEAD_SIZE - HEAD_SIZE or at + HEAD_SIZE + length > limit:
+                break
+            if channel in messages:
+                messages[channel].append(at)
+            else:
+                messages[channel] = [at]
+        else:
+            length = RECORD_HEAD.unpack_from(data, at)[1]
+            if not (code in {SCHEMA, CHANNEL} or code >= PRIVATE) or at + HEAD_SIZE + length > limit:
+                break
+            definitions.append((code, at + HEAD_SIZE, at + HEAD_SIZE + length))
+        at += HEAD_SIZE + length
+    return Found(messages, definitions, at)

@@ -1,0 +1,80 @@
+"""What a file is that is no MCAP file, and what to do with it."""
+
+from pathlib import Path
+
+from navirl_cli.errors import LogError
+from navirl_cli.logs.records import MAGIC
+
+_CONVERT = "rosbags-convert --src {path} --dst {stem}_mcap --dst-storage mcap"
+#: First bytes, what such a file is, the remedy.
+_KNOWN: tuple[tuple[bytes, str, str], ...] = (
+    (b"#ROSBAG V", "a ROS 1 bag", "convert it: " + _CONVERT),
+    (
+        b"SQLite format 3\0",
+        "a ROS 2 bag in SQLite",
+        "convert its folder: " + _CONVERT.replace("{path}", "{dir}"),
+    ),
+    (b"\x28\xb5\x2f\xfd", "a file compressed as a whole with zstd", "decompress it first: zstd -d {path}"),
+    (b"\x04\x22\x4d\x18", "a file compressed as a whole with lz4", "decompress it first: lz4 -d {path}"),
+    (b"\x1f\x8b", "a file compressed as a whole with gzip", "decompress it first: gzip -dk {path}"),
+    (b"PK\x03\x04", "a zip archive", "unpack it first: unzip {path}"),
+)
+
+
+def check_path(path: Path) -> None:
+    """Refuse what is no file.
+
+    Raises:
+        LogError: The path does not exist or is a folder.
+    """
+    if path.is_dir():
+        found = sorted(item.name for item in path.glob("*.mcap"))
+        listing = f"it holds {', '.join(found)}" if found else "it holds no .mcap file"
+        raise LogError(f"{path}: expected an MCAP file, found a folder ({listing}); give the .mcap files in it")
+    if not path.exists():
+        raise LogError(f"{path}: expected an MCAP file, found nothing there; check the path")
+
+
+def check_magic(path: Path, head: bytes, size: int) -> None:
+    """Refuse what does not start like an MCAP file.
+
+    Args:
+        path: The file.
+        head: Its first bytes.
+        size: Its size in bytes.
+
+    Raises:
+        LogError: Names what the file is and what to do with it.
+    """
+    if size == 0:
+        raise LogError(f"{path}: expected an MCAP file, found an empty file; record or copy it again")
+    if head.startswith(MAGIC):
+        if size == len(MAGIC):
+            raise LogError(
+                f"{path}: expected an MCAP header after the magic, found the end of the file (8 bytes); "
+                "nothing was recorded: record or copy it again"
+            )
+        return
+    raise LogError(f"{path}: expected an MCAP file, found {_describe(path, head)}")
+
+
+def _describe(path: Path, head: bytes) -> str:
+    """What the file is, and the remedy."""
+    for start, name, remedy in _KNOWN:
+        if head.startswith(start):
+            return f"{name}; {remedy.format(path=path, stem=path.stem, dir=path.parent)}"
+    if MAGIC.startswith(head):
+        return f"its first {len(head)} bytes only; nothing was recorded: record or copy it again"
+    remedy = "give an .mcap file"
+    if not head.strip(b"\0"):
+        return f"zero bytes; the file was lost when the disk or the power failed: {remedy}"
+    if _is_text(head):
+        first = head.decode(errors="ignore").lstrip()[:1]
+        return f"{'JSON' if first in {'{', '['} else 'text'}; {remedy}"
+    return f"the bytes {head[:8].hex(' ')}; {remedy}"
+
+
+def _is_text(head: bytes) -> bool:
+    """Whether the bytes are printable text; a character cut at their end does not matter."""
+    text = head.decode(errors="ignore")
+    return len(text.encode()) >= len(head) - 3 and all(char.isprintable() or char in "\r\n\t" for char in text)

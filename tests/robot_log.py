@@ -1,0 +1,143 @@
+"""A small log of a robot that drives 4 m and is pushed once, with any part of it left out or spoilt."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from navirl_cli.logs.writer import LogWriter, header, message_type
+
+START_NS = 1_700_000_000_000_000_000
+#: The robot stands for 2 s, drives 4 m in 10 s along y = 0, and stands for 2 s; it is pushed from 5 s to 7 s.
+STAND_S, DRIVE_S, LENGTH_M = 2.0, 10.0, 4.0
+PUSH_S = (5.0, 7.0)
+PUSH_N = np.array([0.0, 12.0])
+
+
+@dataclass(frozen=True)
+class Run:
+    """What to write; the defaults make a sound log."""
+
+    wrench_topics: tuple[str, ...] = ("/wrench",)
+    odometry: bool = True
+    map: bool = True
+    #: Occupied cells (column, row) of the map of 60 x 30 cells of 0.1 m with its corner at (-1.05, -1.55).
+    obstacles: tuple[tuple[int, int], ...] = ()
+    map_yaw: float = 0.0
+    people: tuple[tuple[float, float], ...] | None = ((2.0, 0.9),)
+    #: Goal messages: (seconds, x, y).
+    goals: tuple[tuple[float, float, float], ...] = ((1.5, 4.0, 0.0),)
+    map_to_odom: bool = True
+    sensor_mounted: bool = True
+    #: Yaw of the wrench's frame on the robot, rad.
+    sensor_yaw: float = 1.2
+    moves: bool = True
+    joystick: bool = False
+    session: dict[str, str] | None = None
+
+
+def write_run(path: Path, run: Run = Run()) -> Path:
+    """Write the log."""
+    rng = np.random.default_rng(1)
+    with LogWriter(path) as log:
+        if run.map:
+            log.message("/map", _map(run), START_NS)
+        _transforms(log, run)
+        for topic in run.wrench_topics:
+            _wrench(log, topic, run, rng)
+        if run.odometry:
+            _odometry(log, run)
+        for seconds, x, y in run.goals:
+            at = START_NS + round(seconds * 1e9)
+            log.message("/goal_pose", message_type("geometry_msgs/msg/PoseStamped")(header(at, "map"), _pose(x, y)), at)
+        if run.people is not None:
+            poses = [_pose(x, y) for x, y in run.people]
+            people = message_type("geometry_msgs/msg/PoseArray")(header(START_NS, "map"), poses)
+            log.message("/people", people, START_NS)
+        if run.joystick:
+            _joystick(log)
+        if run.session is not None:
+            log.metadata("navirl.session", run.session)
+    return path
+
+
+def position_m(seconds: np.ndarray) -> np.ndarray:
+    """(n, 2) m where the robot truly is."""
+    share = np.clip((seconds - STAND_S) / DRIVE_S, 0, 1)
+    return np.stack([LENGTH_M * share, np.zeros_like(share)], axis=1)
+
+
+def _pose(x: float, y: float, yaw: float = 0.0) -> Any:
+    point = message_type("geometry_msgs/msg/Point")(float(x), float(y), 0.0)
+    turn = message_type("geometry_msgs/msg/Quaternion")(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
+    return message_type("geometry_msgs/msg/Pose")(point, turn)
+
+
+def _map(run: Run) -> Any:
+    data = np.zeros((30, 60), dtype=np.int8)
+    for column, row in run.obstacles:
+        data[row, column] = 100
+    info = message_type("nav_msgs/msg/MapMetaData")(
+        header(START_NS, "").stamp, 0.1, 60, 30, _pose(-1.05, -1.55, run.map_yaw)
+    )
+    return message_type("nav_msgs/msg/OccupancyGrid")(header(START_NS, "map"), info, data.reshape(-1))
+
+
+def _transforms(log: LogWriter, run: Run) -> None:
+    tf = message_type("tf2_msgs/msg/TFMessage")
+    vector = message_type("geometry_msgs/msg/Vector3")
+
+    def stamped(t_ns: int, parent: str, child: str, pose: Any) -> Any:
+        motion = message_type("geometry_msgs/msg/Transform")(
+            vector(pose.position.x, pose.position.y, 0.0), pose.orientation
+        )
+        return message_type("geometry_msgs/msg/TransformStamped")(header(t_ns, parent), child, motion)
+
+    if run.sensor_mounted:
+        log.message("/tf_static", tf([stamped(START_NS, "base", "sensor", _pose(0, 0, run.sensor_yaw))]), START_NS)
+    if run.map_to_odom:
+        # The odometry's frame is turned by 90 degrees and moved.
+        for step in range(29):
+            at = START_NS + step * 500_000_000
+            log.message("/tf", tf([stamped(at, "map", "odom", _pose(1.0, 2.0, np.pi / 2))]), at)
+
+
+def _wrench(log: LogWriter, topic: str, run: Run, rng: np.random.Generator) -> None:
+    seconds = np.arange(0, 14, 0.01)
+    times = START_NS + np.round(seconds * 1e9).astype(np.int64)
+    push = ((seconds >= PUSH_S[0]) & (seconds < PUSH_S[1]))[:, None] * PUSH_N
+    cos, sin = np.cos(run.sensor_yaw), np.sin(run.sensor_yaw)
+    force = np.column_stack([cos * push[:, 0] + sin * push[:, 1], -sin * push[:, 0] + cos * push[:, 1], 0 * seconds])
+    force += np.array([3.0, -2.0, 5.0]) + rng.normal(0, 0.2, force.shape)
+    vector = message_type("geometry_msgs/msg/Vector3")
+    wrench = message_type("geometry_msgs/msg/Wrench")(vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+    template = message_type("geometry_msgs/msg/WrenchStamped")(header(0, "sensor"), wrench)
+    columns = {f"wrench.force.{axis}": force[:, i] for i, axis in enumerate("xyz")}
+    log.columns(topic, template, times, {"header.stamp": times, **columns})
+
+
+def _odometry(log: LogWriter, run: Run) -> None:
+    seconds = np.arange(0, 14, 1 / 30)
+    times = START_NS + np.round(seconds * 1e9).astype(np.int64)
+    true = position_m(seconds) if run.moves else np.zeros((len(seconds), 2))
+    # map -> odom turns by 90 degrees and moves by (1, 2): odom = R(-90) (map - (1, 2)).
+    moved = true - (1.0, 2.0)
+    vector = message_type("geometry_msgs/msg/Vector3")
+    twist = message_type("geometry_msgs/msg/Twist")(vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+    template = message_type("nav_msgs/msg/Odometry")(
+        header(0, "odom"),
+        "base",
+        message_type("geometry_msgs/msg/PoseWithCovariance")(_pose(0, 0, -np.pi / 2), np.zeros(36)),
+        message_type("geometry_msgs/msg/TwistWithCovariance")(twist, np.zeros(36)),
+    )
+    columns = {"pose.pose.position.x": moved[:, 1], "pose.pose.position.y": -moved[:, 0]}
+    log.columns("/odom", template, times, {"header.stamp": times, **columns})
+
+
+def _joystick(log: LogWriter) -> None:
+    for step in range(280):
+        at = START_NS + step * 50_000_000
+        axes = np.array([0.0, 0.7 if 100 <= step < 140 else 0.0], dtype=np.float32)
+        joy = message_type("sensor_msgs/msg/Joy")(header(at, ""), axes, np.zeros(0, dtype=np.int32))
+        log.message("/joy", joy, at)

@@ -1,0 +1,196 @@
+"""The reader against mcap's own reader and rosbags, over every way of writing a file."""
+
+import os
+from pathlib import Path
+
+import log_factory as forge
+import mcap.writer
+import numpy as np
+import pytest
+import zstandard
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from navirl_cli.logs.reader import read, scan
+from navirl_cli.logs.schema import value_at
+
+WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x", "wrench.force.z", "wrench.torque.y")
+ODOM_FIELDS = ("header.stamp", "child_frame_id", "pose.pose.position.x", "pose.covariance", "twist.twist.angular.z")
+
+
+def check_same(path, topic, fields, *, expected_count=None):
+    """The columns must be those that the slow twin reads."""
+    result = read(path, {topic: fields})
+    assert result.damage == ()
+    series = result.series[topic]
+    slow = forge.slow_read(path, topic)
+    assert len(series) == len(slow) == (expected_count or len(slow))
+    assert series.log_time_ns.dtype == np.int64
+    assert series.log_time_ns.tolist() == [t_ns for t_ns, _ in slow]
+    for name in fields:
+        values = [value_at(message, name) for _, message in slow]
+        if name.endswith("stamp"):
+            values = [value.sec * 10**9 + value.nanosec for value in values]
+            assert series.columns[name].dtype == np.int64
+        assert np.array_equal(series.columns[name], np.array(values)), name
+    return series
+
+
+@pytest.mark.parametrize("way", forge.WAYS)
+def test_every_way_of_writing_reads_as_the_slow_twin(tmp_path, way):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS[way])
+    check_same(path, "/wrench", WRENCH_FIELDS, expected_count=600)
+    check_same(path, "/odom", ODOM_FIELDS, expected_count=60)
+
+
+@pytest.mark.parametrize("way", forge.WAYS)
+def test_scan_counts_every_way_of_writing(tmp_path, way):
+    metadata = [("rosbag2", {"a": "1"}), ("navirl", {"person": "ann"}), ("navirl", {"person": "bob"})]
+    path = forge.forge(tmp_path / "run.mcap", forge.run(), metadata=metadata, **forge.WAYS[way])
+    contents = scan(path)
+    assert (contents.profile, contents.library) == ("ros2", "forged")
+    assert [contents.topic_count(topic) for topic in ("/wrench", "/odom", "/camera", "/none")] == [600, 60, 30, 0]
+    assert (contents.start_ns, contents.end_ns) == (forge.START_NS, forge.START_NS + 599 * 2_000_000)
+    assert contents.metadata == {"rosbag2": ({"a": "1"},), "navirl": ({"person": "ann"}, {"person": "bob"})}
+    assert contents.damage == ()
+    channel = next(channel for channel in contents.channels if channel.topic == "/wrench")
+    assert (channel.schema_name, channel.schema_encoding, channel.message_encoding) == (forge.WRENCH, "ros2msg", "cdr")
+    assert "geometry_msgs/Wrench wrench" in channel.schema_text
+
+
+def test_zstd_frames_without_content_size(tmp_path, monkeypatch):
+    compress = zstandard.ZstdCompressor(write_content_size=False).compress
+    monkeypatch.setattr(mcap.writer.zstandard, "compress", compress)
+    path = forge.forge(tmp_path / "run.mcap", forge.run())
+    check_same(path, "/wrench", WRENCH_FIELDS, expected_count=600)
+
+
+def test_big_endian_reads_as_the_slow_twin(tmp_path):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(80, little_endian=False))
+    check_same(path, "/wrench", WRENCH_FIELDS, expected_count=80)
+    check_same(path, "/odom", ODOM_FIELDS, expected_count=8)
+
+
+@pytest.mark.parametrize(
+    "frame_ids", [("a", "bb", "", "ccc"), ("aa", "bb"), tuple("abcdefghijklmnopqrstuvwxyz"), ("ü",)]
+)
+def test_changing_frame_ids(tmp_path, frame_ids):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(200, frame_ids=frame_ids))
+    series = check_same(path, "/wrench", WRENCH_FIELDS)
+    assert series.columns["header.frame_id"][1] == frame_ids[1 % len(frame_ids)]
+
+
+def test_little_and_big_endian_messages_mixed(tmp_path):
+    little, big = forge.run(60), forge.run(60, little_endian=False)
+    mixed = [(little, big)[number % 2][number] for number in range(len(little))]
+    check_same(forge.forge(tmp_path / "run.mcap", mixed), "/wrench", WRENCH_FIELDS)
+
+
+def test_more_layouts_than_are_derived_at_once(tmp_path):
+    # all of one total size (the alignment hides the lengths) but with eight different lengths
+    names = ["x" * length for length in range(1, 9)]
+    messages = [
+        forge.Message(
+            "/odom",
+            forge.ODOMETRY,
+            number,
+            forge.cdr(forge.odometry(0, 1.0, 2.0, names[number % 8], names[-1 - number % 8])),
+        )
+        for number in range(64)
+    ]
+    check_same(forge.forge(tmp_path / "run.mcap", messages), "/odom", (*ODOM_FIELDS, "header.frame_id"))
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    rows=st.lists(
+        st.tuples(
+            st.integers(0, 2**31 - 1),
+            st.floats(allow_nan=False),
+            st.text(alphabet=st.characters(codec="utf-8", exclude_characters="\0"), max_size=9),
+            st.text(alphabet="ab", max_size=3),
+            st.booleans(),
+        ),
+        min_size=1,
+        max_size=30,
+    )
+)
+def test_any_texts_and_numbers_read_as_the_slow_twin(tmp_path_factory, rows):
+    messages = [
+        forge.Message(
+            "/odom",
+            forge.ODOMETRY,
+            sec * 1000,
+            forge.cdr(forge.odometry(sec * 10**9 + 5, x, -x, frame, child), little_endian=little),
+        )
+        for sec, x, frame, child, little in rows
+    ]
+    path = forge.forge(tmp_path_factory.mktemp("any") / "run.mcap", messages, chunk_size=2000)
+    check_same(path, "/odom", ("header.stamp", "header.frame_id", "child_frame_id", "pose.pose.position.y"))
+
+
+def test_whole_messages_equal_those_of_the_slow_twin(tmp_path):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(60))
+    series = read(path, {"/odom": None}).series["/odom"]
+    slow = forge.slow_read(path, "/odom")
+    assert series.columns == {}
+    assert [message.header.stamp.nanosec for message in series.messages] == [m.header.stamp.nanosec for _, m in slow]
+    assert np.array_equal(series.messages[3].pose.covariance, slow[3][1].pose.covariance)
+
+
+def test_several_files_are_sorted_by_time_and_ties_keep_their_order(tmp_path):
+    def single(name, times, force):
+        messages = [
+            forge.Message("/wrench", forge.WRENCH, t, forge.cdr(forge.wrench(t, (force + k, 0, 0))))
+            for k, t in enumerate(times)
+        ]
+        return forge.forge(tmp_path / name, messages)
+
+    first, second = single("a.mcap", [10, 30, 20, 30], 100.0), single("b.mcap", [5, 30, 40], 200.0)
+    series = read([first, second], {"/wrench": ("wrench.force.x",)}).series["/wrench"]
+    assert series.log_time_ns.tolist() == [5, 10, 20, 30, 30, 30, 40]
+    assert series.columns["wrench.force.x"].tolist() == [200.0, 100.0, 102.0, 101.0, 103.0, 201.0, 202.0]
+
+
+def test_several_channels_of_one_topic_keep_the_order_of_the_file(tmp_path):
+    messages = [
+        forge.Message("/wrench", forge.WRENCH, 1000, forge.cdr(forge.wrench(0, (float(k), 0, 0)))) for k in range(40)
+    ]
+    path = forge.forge(tmp_path / "run.mcap", messages, channel_for={k: k % 2 for k in range(40)}, chunk_size=1500)
+    series = read(path, {"/wrench": ("wrench.force.x",)}).series["/wrench"]
+    assert series.columns["wrench.force.x"].tolist() == list(range(40))
+
+
+def test_a_topic_that_no_file_has_is_left_out_and_an_empty_one_is_empty(tmp_path):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(20))
+    assert read(path, {"/nowhere": None}).series == {}
+    empty = forge.forge(tmp_path / "empty.mcap", [])
+    assert scan(empty).start_ns is None
+    assert read(empty, {"/wrench": WRENCH_FIELDS}).series == {}
+
+
+def test_progress_reaches_the_end(tmp_path):
+    paths = [forge.forge(tmp_path / f"{k}.mcap", forge.run(100)) for k in range(2)]
+    calls = []
+    read(paths, {"/wrench": ("header.stamp",)}, progress=lambda done, total: calls.append((done, total)))
+    total = sum(path.stat().st_size for path in paths)
+    assert calls[-1] == (total, total)
+    assert calls == sorted(calls)
+
+
+def test_a_real_log():
+    folder = Path(os.environ.get("NAVIRL_LOGS_DIR", Path(__file__).resolve().parent.parent.parent / "shared" / "logs"))
+    path = folder / "nav2_turtlebot.mcap"
+    if not path.exists():
+        pytest.skip(f"no {path}: set NAVIRL_LOGS_DIR to the folder that holds it")
+    series = check_same(
+        path, "/odom", ("header.stamp", "header.frame_id", "pose.pose.orientation.w", "pose.covariance")
+    )
+    assert len(series) == 2639
+    assert len(read(path, {"/tf": None}).series["/tf"].messages) == 5422
+    contents = scan(path)
+    assert (contents.topic_count("/odom"), contents.topic_count("/tf"), contents.topic_count("/tf_static")) == (
+        2639,
+        5422,
+        1,
+    )
