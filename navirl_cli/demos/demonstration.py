@@ -1,0 +1,117 @@
+"""The core type: one trial as evidence of how a person wants the robot to drive."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.errors import DemonstrationError
+
+
+class Condition(StrEnum):
+    """What steered the robot beside its own navigation."""
+
+    FORCE = "force"
+    JOYSTICK = "joystick"
+    AUTONOMOUS = "autonomous"
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One interval in which the person pushed."""
+
+    #: First and last instant, s since the trial's start.
+    start_s: float
+    end_s: float
+    #: Largest horizontal force, N.
+    peak_n: float
+    #: Integral of the horizontal force, (x, y) in N s, map frame.
+    impulse_ns: tuple[float, float]
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the interval in s."""
+        return self.end_s - self.start_s
+
+    @property
+    def direction_rad(self) -> float:
+        """Direction of the impulse in the map frame, from the x axis, rad."""
+        return float(np.arctan2(self.impulse_ns[1], self.impulse_ns[0]))
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """A trial: the path that was driven, the forces on the way, and the scene around it."""
+
+    #: Name, unique within a file of demonstrations: participant, slash, number of the trial.
+    id: str
+    participant: str
+    condition: Condition
+    #: True where the person intervened (pushed, or moved the joystick), so that the path shows their wish.
+    corrected: bool
+    #: Number of the interaction cycle (Sec. IV-C), or None where the log does not say.
+    cycle: int | None
+    #: Log time of the trial's start, ns since the epoch of the log's clock.
+    start_ns: int
+    #: (n,) s since the trial's start, increasing.
+    t_s: FloatArray
+    #: (n, 2) m, map frame.
+    xy_m: FloatArray
+    #: (n,) rad, map frame.
+    yaw_rad: FloatArray
+    #: (n, 2) N, map frame, bias removed and low-passed; None where the log holds no wrench.
+    force_n: FloatArray | None
+    contacts: tuple[Contact, ...]
+    #: The announced goal, m, map frame.
+    goal_m: tuple[float, float]
+    #: (p, 2) m, map frame: where the people stand.
+    people_m: FloatArray
+    #: Radius of the robot, m.
+    robot_radius_m: float
+    #: Cells that the robot's centre may enter; the driven ones are free.
+    grid: Grid
+    #: (k, 2) column and row: the 8-connected path on the grid, from the start's cell to the cell where the trial ended.
+    cells: IntArray
+    #: File name of the log.
+    log: str = ""
+    #: What a reader of the results should know of this trial.
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Check shapes, order and that the path fits the grid."""
+        n = len(self.t_s)
+        for name, value, shape in (
+            ("t_s", self.t_s, (n,)),
+            ("xy_m", self.xy_m, (n, 2)),
+            ("yaw_rad", self.yaw_rad, (n,)),
+            ("force_n", self.force_n, (n, 2)),
+            ("people_m", self.people_m, (len(self.people_m), 2)),
+            ("cells", self.cells, (len(self.cells), 2)),
+        ):
+            if value is not None and value.shape != shape:
+                self._refuse(f"{name} needs the shape {shape}, found {value.shape}")
+            if value is not None and not np.isfinite(value).all():
+                self._refuse(f"{name} holds values that are not finite")
+        if n < 2 or not (np.diff(self.t_s) > 0).all():
+            self._refuse("needs at least two poses at increasing times")
+        if len(self.cells) < 2:
+            self._refuse("its path stays within one cell: the robot did not move")
+        steps = np.abs(np.diff(self.cells, axis=0)).max(axis=1)
+        if (steps != 1).any():
+            self._refuse(f"step {int(np.flatnonzero(steps != 1)[0])} of its path does not lead to a neighbouring cell")
+        if self.grid.is_occupied(self.cells).any():
+            self._refuse("its path crosses occupied cells of its map")
+
+    def _refuse(self, reason: str) -> None:
+        raise DemonstrationError(f"demonstration {self.id}: {reason}")
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first pose to the last, s."""
+        return float(self.t_s[-1] - self.t_s[0])
+
+    @property
+    def contact_s(self) -> float:
+        """Time in contact, s."""
+        return sum(contact.duration_s for contact in self.contacts)

@@ -1,0 +1,192 @@
+"""Occupancy on square cells: where they are, which are free, and how a robot's radius grows the obstacles."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from math import ceil
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from navirl_cli.errors import GridError
+
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Displacements (dx, dy) in cells of the eight moves, in a fixed order that every array "by move" follows.
+MOVES: IntArray = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.int64)
+
+#: map_server's default: an occupancy of 65 % and more is an obstacle.
+OCCUPIED_FROM = 65
+#: A costmap marks cells within the robot's inscribed radius 99 and obstacles themselves 100.
+INSCRIBED = 99
+
+
+@dataclass(frozen=True)
+class Grid:
+    """An occupancy grid whose rows run along y and whose columns run along x of the map frame."""
+
+    #: True where the robot's centre cannot be. Shape (rows, columns): row 0 has the lowest y, column 0 the lowest x.
+    occupied: BoolArray
+    #: Side of a cell in m.
+    resolution_m: float
+    #: Lower left corner of cell (column 0, row 0), (x, y) in m, map frame.
+    origin_m: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Check shapes and units."""
+        if self.occupied.ndim != 2 or self.occupied.dtype != np.bool_ or self.occupied.size == 0:
+            raise GridError(
+                f"a grid needs a two-dimensional array of bool, found {self.occupied.dtype} "
+                f"of shape {self.occupied.shape}"
+            )
+        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
+            raise GridError(f"a grid's resolution must be a positive number of metres, found {self.resolution_m}")
+        if not np.isfinite(self.origin_m).all():
+            raise GridError(f"a grid's origin must be finite, found {self.origin_m}")
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows (along y) and columns (along x)."""
+        rows, columns = self.occupied.shape
+        return rows, columns
+
+    @property
+    def extent_m(self) -> tuple[float, float, float, float]:
+        """Borders in m, map frame: x_min, x_max, y_min, y_max (the order of matplotlib's ``extent``)."""
+        rows, columns = self.shape
+        x, y = self.origin_m
+        return x, x + columns * self.resolution_m, y, y + rows * self.resolution_m
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of geometry and cells: equal grids have equal digests."""
+        x, y = self.origin_m  # plain floats, for numpy prints its own otherwise
+        head = repr((self.shape, float(self.resolution_m), (float(x), float(y)))).encode()
+        return sha256(head + np.packbits(self.occupied).tobytes()).hexdigest()
+
+    def cells_of(self, xy_m: ArrayLike) -> IntArray:
+        """Cells that hold points of the map frame, inside the grid or not.
+
+        Args:
+            xy_m: (..., 2) m.
+
+        Returns:
+            (..., 2) column and row.
+        """
+        return np.floor((np.asarray(xy_m, dtype=float) - self.origin_m) / self.resolution_m).astype(np.int64)
+
+    def centres_of(self, cells: ArrayLike) -> FloatArray:
+        """Centres in m, map frame, of (..., 2) cells (column, row)."""
+        centres: FloatArray = (np.asarray(cells) + 0.5) * self.resolution_m + np.asarray(self.origin_m)
+        return centres
+
+    def contains(self, cells: ArrayLike) -> BoolArray:
+        """Whether (..., 2) cells lie on the grid."""
+        cells = np.asarray(cells)
+        rows, columns = self.shape
+        inside: BoolArray = np.all((cells >= 0) & (cells < (columns, rows)), axis=-1)
+        return inside
+
+    def is_occupied(self, cells: ArrayLike) -> BoolArray:
+        """Whether (..., 2) cells are occupied; cells beyond the grid are."""
+        cells = np.asarray(cells)
+        inside = self.contains(cells)
+        blocked = np.ones(inside.shape, dtype=bool)
+        blocked[inside] = self.occupied[cells[inside][..., 1], cells[inside][..., 0]]
+        return blocked
+
+    def connected_to(self, cell: ArrayLike) -> BoolArray:
+        """(rows, columns) cells that eight-connected moves over free cells reach from a (2,) free cell on the grid."""
+        from scipy.ndimage import label
+
+        labels, _ = label(~self.occupied, structure=np.ones((3, 3)))
+        column, row = np.asarray(cell)
+        reached: BoolArray = labels == labels[row, column]
+        return reached
+
+    def freed(self, cells: IntArray) -> "Grid":
+        """The same grid with (n, 2) cells free.
+
+        Raises:
+            GridError: A cell lies beyond the grid.
+        """
+        outside = ~self.contains(cells)
+        if outside.any():
+            x, y = self.centres_of(cells[outside][0])
+            raise GridError(
+                f"{int(outside.sum())} cells of the path lie beyond the map, the first at x {x:.2f} m, y {y:.2f} m; "
+                f"the map spans x {self.extent_m[0]:.2f} to {self.extent_m[1]:.2f} m, "
+                f"y {self.extent_m[2]:.2f} to {self.extent_m[3]:.2f} m: give the map in which the robot drove"
+            )
+        occupied = self.occupied.copy()
+        occupied[cells[:, 1], cells[:, 0]] = False
+        return Grid(occupied, self.resolution_m, self.origin_m)
+
+    def inflated(self, radius_m: float, around_m: ArrayLike | None = None) -> "Grid":
+        """Obstacles grown by a radius, so that a robot of that radius is a point.
+
+        Args:
+            radius_m: Cells whose centre is nearer than this to an occupied cell's centre become occupied.
+            around_m: (p, 2) m, map frame: grow these points (people, say) in place of the obstacles' centres.
+
+        Returns:
+            A new grid; obstacles remain.
+        """
+        if radius_m <= 0:
+            return self
+        if around_m is not None:
+            rows, columns = np.indices(self.shape)
+            centres = self.centres_of(np.stack([columns, rows], axis=2))
+            near = np.zeros(self.shape, dtype=bool)
+            for point in np.reshape(np.asarray(around_m, dtype=float), (-1, 2)):
+                near |= np.hypot(*np.moveaxis(centres - point, 2, 0)) < radius_m
+            return Grid(self.occupied | near, self.resolution_m, self.origin_m)
+        if not self.occupied.any():
+            return self
+        from scipy.ndimage import distance_transform_edt
+
+        near = distance_transform_edt(~self.occupied) * self.resolution_m < radius_m
+        return Grid(self.occupied | near, self.resolution_m, self.origin_m)
+
+    def resampled(self, resolution_m: float) -> "Grid":
+        """The same area on cells of another size: a cell is occupied when it touches an occupied one."""
+        if resolution_m == self.resolution_m:
+            return self
+        rows, columns = (max(1, ceil(n * self.resolution_m / resolution_m - 1e-9)) for n in self.shape)
+        occupied = np.zeros((rows, columns), dtype=bool)
+        taken = np.argwhere(self.occupied)
+        ratio = self.resolution_m / resolution_m
+        low = np.floor(taken * ratio + 1e-9).astype(np.int64)
+        high = np.ceil((taken + 1) * ratio - 1e-9).astype(np.int64)
+        span = int((high - low).max()) if len(taken) else 0
+        for i in range(span):
+            for j in range(span):
+                row, column = np.minimum(low[:, 0] + i, high[:, 0] - 1), np.minimum(low[:, 1] + j, high[:, 1] - 1)
+                occupied[np.minimum(row, rows - 1), np.minimum(column, columns - 1)] = True
+        return Grid(occupied, resolution_m, self.origin_m)
+
+
+def grid_from_occupancy(
+    data: NDArray[np.int8], resolution_m: float, origin_m: tuple[float, float], robot_radius_m: float
+) -> Grid:
+    """Turn ROS occupancy into a grid for the robot's centre.
+
+    A costmap is recognised by its inscribed cells of 99: it is inflated already, so that its lethal cells are taken as
+    they are. A plain map's obstacles are grown by the robot's radius. Unknown cells (-1) count as occupied: nobody has
+    shown that a robot can drive there.
+
+    Args:
+        data: (rows, columns), -1 unknown, 0..100 per cent, as nav_msgs/OccupancyGrid.
+        resolution_m: Side of a cell, m.
+        origin_m: Lower left corner, m, map frame.
+        robot_radius_m: Radius of the robot, m.
+
+    Returns:
+        The grid.
+    """
+    if (data == INSCRIBED).any():
+        return Grid(data >= INSCRIBED, resolution_m, origin_m)
+    unknown = data < 0
+    obstacles = Grid(data >= OCCUPIED_FROM, resolution_m, origin_m).inflated(robot_radius_m)
+    return Grid(obstacles.occupied | unknown, resolution_m, origin_m)

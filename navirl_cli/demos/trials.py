@@ -1,0 +1,125 @@
+"""Where one trial ends and the next begins."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from navirl_cli.demos.grid import BoolArray, FloatArray, IntArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.logs.recording import Recording
+
+#: Slower than this is standing, m/s; the window over which the speed is taken, s.
+STANDING_M_S = 0.04
+WINDOW_S = 0.5
+#: A robot at rest this near to its goal has arrived, m.
+ARRIVED_M = 0.5
+#: A goal this near to the present one is the same goal said again, m.
+SAME_GOAL_M = 0.05
+#: A rest of this length parts two trials for --split stop, s.
+REST_S = 1.0
+#: A trial that covers less is none, m.
+MIN_TRAVEL_M = 0.5
+
+
+class Split(StrEnum):
+    """What starts a new trial."""
+
+    GOAL = "goal"
+    STOP = "stop"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A stretch of poses."""
+
+    #: First and one past the last pose.
+    first: int
+    stop: int
+    #: (x, y) m, map frame; None where the log announces none.
+    goal_m: tuple[float, float] | None
+    #: False where a goal was announced and the robot did not rest near it.
+    arrived: bool = True
+
+
+def trials_of(recording: Recording, split: Split) -> list[Trial]:
+    """Split a recording into trials.
+
+    ``goal``: a trial starts when a goal is announced (saying the present goal again while driving to it starts none)
+    and ends where the robot first comes to rest near it, else where it came nearest before the next goal, so that the
+    drive back belongs to no trial. ``stop``: trials are the drives between rests. ``none``: one trial.
+
+    Args:
+        recording: Poses and goals.
+        split: How.
+
+    Returns:
+        Trials in order of time; those that cover less than half a metre are included, for the caller to report.
+
+    Raises:
+        DemonstrationError: There is no goal to split at.
+    """
+    standing = speeds_m_s(recording.t_ns, recording.xy_m) < STANDING_M_S
+    if split is Split.NONE:
+        return [Trial(0, len(recording.t_ns), None)]
+    if split is Split.STOP:
+        return _between_rests(recording.t_ns, standing)
+    if len(recording.goal_t_ns) == 0:
+        raise DemonstrationError(
+            f"{recording.log}: no goal is announced, so that trials cannot be split at goals; "
+            "say where it is with --goal x,y, or choose --split stop or --split none"
+        )
+    return _at_goals(recording, standing)
+
+
+def speeds_m_s(t_ns: IntArray, xy_m: FloatArray) -> FloatArray:
+    """(n,) speed over half a second around each pose, so that the noise of single poses does not count, m/s."""
+    t = (t_ns - t_ns[0]) / 1e9
+    early, late = np.maximum(t - WINDOW_S / 2, t[0]), np.minimum(t + WINDOW_S / 2, t[-1])
+    moved = [np.interp(late, t, axis) - np.interp(early, t, axis) for axis in xy_m.T]
+    speed: FloatArray = np.hypot(*moved) / np.maximum(late - early, 1e-9)
+    return speed
+
+
+def _between_rests(t_ns: IntArray, standing: BoolArray) -> list[Trial]:
+    """Drives between rests that are long enough."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int8)))
+    rests = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if t_ns[b - 1] - t_ns[a] >= REST_S * 1e9]
+    borders = [0] + [border for rest in rests for border in rest] + [len(t_ns)]
+    return [Trial(int(a), int(b), None) for a, b in zip(borders[::2], borders[1::2], strict=True) if b - a > 1]
+
+
+def _at_goals(recording: Recording, standing: BoolArray) -> list[Trial]:
+    """From each new goal to the rest near it."""
+    starts = np.searchsorted(recording.t_ns, recording.goal_t_ns)
+    trials: list[Trial] = []
+    for number, (start, goal) in enumerate(zip(starts.tolist(), recording.goal_m, strict=True)):
+        if trials and start < trials[-1].stop:
+            present = trials[-1].goal_m
+            if present is not None and np.hypot(*(goal - present)) < SAME_GOAL_M:
+                continue
+        later = starts[number + 1 :][np.hypot(*(recording.goal_m[number + 1 :] - goal).T) >= SAME_GOAL_M]
+        border = int(later[0]) if len(later) else len(recording.t_ns)
+        if border - start < 2:
+            continue
+        trials.append(_towards(recording, standing, (start, border), goal))
+    return trials
+
+
+def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], goal: FloatArray) -> Trial:
+    """The trial within a span of poses that ends near a goal."""
+    first, border = span
+    distance = np.hypot(*(recording.xy_m[first:border] - goal).T)
+    target = (float(goal[0]), float(goal[1]))
+    resting = np.flatnonzero(standing[first:border] & (distance < ARRIVED_M) & _has_left(distance))
+    if len(resting):
+        return Trial(first, first + int(resting[0]) + 1, target)
+    nearest = int(distance.argmin())
+    return Trial(first, first + max(nearest, 1) + 1, target, arrived=bool(distance[nearest] < ARRIVED_M))
+
+
+def _has_left(distance: FloatArray) -> BoolArray:
+    """(n,) whether the robot has moved since the start: one that waits at an old goal has not arrived at a new one."""
+    left: BoolArray = np.abs(distance - distance[0]) > MIN_TRAVEL_M / 2
+    return left

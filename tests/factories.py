@@ -1,0 +1,96 @@
+"""Scenes and demonstrations, made to measure."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.grid import Grid
+from navirl_cli.irl.lattice import Lattice
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.paths import sample_paths
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene
+
+RESOLUTION_M = 0.1
+NOBODY: NDArray[np.float64] = np.zeros((0, 2))
+
+
+def grid_of(drawing: str, resolution_m: float = RESOLUTION_M, origin_m: tuple[float, float] = (0.0, 0.0)) -> Grid:
+    """A grid from a drawing seen from above, x to the right and y up: # is occupied, anything else free."""
+    lines = [line.strip() for line in drawing.strip().splitlines()]
+    return Grid(np.array([[mark == "#" for mark in line] for line in lines[::-1]]), resolution_m, origin_m)
+
+
+def open_grid(columns: int, rows: int, origin_m: tuple[float, float] = (0.0, 0.0)) -> Grid:
+    return Grid(np.zeros((rows, columns), dtype=bool), RESOLUTION_M, origin_m)
+
+
+def scene_on(grid: Grid, start: ArrayLike, goal: ArrayLike, people_m: ArrayLike = NOBODY) -> Scene:
+    return Scene.on(grid, np.array(start), np.array(goal), np.reshape(np.asarray(people_m, dtype=float), (-1, 2)))
+
+
+def random_scene(rng: np.random.Generator, columns: int, rows: int, density: float, people: int = 1) -> Scene:
+    """A map with random obstacles, and two far apart cells in its largest connected part."""
+    while True:
+        grid = Grid(rng.random((rows, columns)) < density, RESOLUTION_M, (-0.35, 0.8))
+        cell = rng.integers(0, [columns, rows])
+        if grid.is_occupied(cell):
+            continue
+        lattice = Lattice.around(grid, cell)
+        if lattice.size < 0.5 * columns * rows:
+            continue
+        start, goal = lattice.cells[[0, -1]]
+        people_m = np.asarray(grid.origin_m) + rng.random((people, 2)) * (columns * 0.1, rows * 0.1)
+        return scene_on(grid, start, goal, people_m)
+
+
+def demonstration(
+    grid: Grid,
+    cells: ArrayLike,
+    people_m: ArrayLike = NOBODY,
+    number: int = 1,
+    participant: str = "p1",
+    **fields: object,
+) -> Demonstration:
+    """A trial that was driven from centre to centre, a cell in 0.25 s."""
+    path = np.asarray(cells, dtype=np.int64)
+    xy_m = grid.centres_of(path)
+    goal_x, goal_y = xy_m[-1]
+    made = Demonstration(
+        id=f"{participant}/{number}",
+        participant=participant,
+        condition=Condition.FORCE,
+        corrected=True,
+        cycle=None,
+        start_ns=0,
+        t_s=np.arange(len(path)) * 0.25,
+        xy_m=xy_m,
+        yaw_rad=np.zeros(len(path)),
+        force_n=None,
+        contacts=(),
+        goal_m=(float(goal_x), float(goal_y)),
+        people_m=np.reshape(np.asarray(people_m, dtype=float), (-1, 2)),
+        robot_radius_m=0.25,
+        grid=grid,
+        cells=path,
+    )
+    return replace(made, **fields)
+
+
+def drawn(scene: Scene, reward: Reward, count: int, seed: int) -> list[Demonstration]:
+    """Demonstrations sampled from the policy of a reward: their truth is known."""
+    paths = sample_paths(policy_of(reward, scene), scene.start, count, np.random.default_rng(seed))
+    return [
+        demonstration(scene.lattice.grid, scene.lattice.cells[paths.path(k)], scene.people_m, number=k + 1)
+        for k in range(count)
+    ]
+
+
+def by_cell(scene: Scene, by_state: NDArray[np.float64], empty: float) -> NDArray[np.float64]:
+    """An array by state, (n, ...), spread over the map, (rows, columns, ...)."""
+    spread = np.full((*scene.lattice.grid.shape, *by_state.shape[1:]), empty)
+    columns, rows = scene.lattice.cells.T
+    spread[rows, columns] = by_state
+    return spread

@@ -1,0 +1,289 @@
+"""Slow, obvious twins: what the fast code must agree with, written for reading and not for speed.
+
+Nothing here imports the code under test. Maps are arrays of bool ``free[row, column]``; cells are (column, row) as in
+the package; arrays by move follow MOVES.
+"""
+
+import heapq
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from math import exp, hypot, log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Cell = tuple[int, int]
+
+#: (dx, dy) of the eight moves, counter-clockwise from +x.
+MOVES: tuple[Cell, ...] = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
+
+
+def is_free(free: BoolArray, cell: Cell) -> bool:
+    column, row = cell
+    return 0 <= row < free.shape[0] and 0 <= column < free.shape[1] and bool(free[row, column])
+
+
+def free_cells(free: BoolArray) -> list[Cell]:
+    return [(int(column), int(row)) for row, column in np.argwhere(free)]
+
+
+def ways(free: BoolArray, cell: Cell) -> Iterator[tuple[int, Cell]]:
+    """Number of the move and the cell it leads to, for every possible move."""
+    for move, (dx, dy) in enumerate(MOVES):
+        target = cell[0] + dx, cell[1] + dy
+        if is_free(free, target):
+            yield move, target
+
+
+# --- shortest paths -------------------------------------------------------------------------------------------------
+
+
+def steps_from(free: BoolArray, source: Cell) -> dict[Cell, tuple[int, int]]:
+    """(straight, diagonal) steps of a shortest path from the source to every cell it reaches, by plain Dijkstra.
+
+    The square root of 2 is irrational: two paths have the same length only if these pairs are equal, so that "on a
+    shortest path" can be asked without any tolerance.
+    """
+    done: dict[Cell, tuple[int, int]] = {}
+    queue = [(0.0, (0, 0), source)]
+    while queue:
+        _, (straight, diagonal), cell = heapq.heappop(queue)
+        if cell in done:
+            continue
+        done[cell] = straight, diagonal
+        for move, target in ways(free, cell):
+            pair = (straight, diagonal + 1) if move % 2 else (straight + 1, diagonal)
+            heapq.heappush(queue, (pair[0] + pair[1] * sqrt(2), pair, target))
+    return done
+
+
+def nominal_cells(free: BoolArray, start: Cell, goal: Cell) -> set[Cell]:
+    """Cells on any shortest path: the steps from the start and those to the goal add up to the shortest path's."""
+    there, back = steps_from(free, start), steps_from(free, goal)
+    return {cell for cell in there if tuple(np.add(there[cell], back[cell])) == there[goal]}
+
+
+# --- reward, soft values, visits ------------------------------------------------------------------------------------
+
+
+def paper_reward(
+    theta: tuple[float, ...],
+    free: BoolArray,
+    start: Cell,
+    goal: Cell,
+    people_m: FloatArray,
+    resolution_m: float,
+    origin_m: tuple[float, float],
+) -> FloatArray:
+    """r(s, a) of Eqs. 11-13, cell by cell: (rows, columns, 8), -inf where no move is possible and in the goal."""
+    c0, a_g, a_p, sigma_p = theta
+    nominal = nominal_cells(free, start, goal)
+    reward = np.full((*free.shape, 8), -np.inf)
+    for cell in free_cells(free):
+        if cell == goal:
+            continue
+        deviation_m = min(hypot(cell[0] - c, cell[1] - r) for c, r in nominal) * resolution_m
+        x = origin_m[0] + (cell[0] + 0.5) * resolution_m
+        y = origin_m[1] + (cell[1] + 0.5) * resolution_m
+        here = a_g * deviation_m**2
+        here += sum(a_p * exp(-sigma_p * ((x - px) ** 2 + (y - py) ** 2)) for px, py in people_m)
+        for move, _ in ways(free, cell):
+            reward[cell[1], cell[0], move] = here + c0 * hypot(*MOVES[move]) * resolution_m
+    return reward
+
+
+def ahead(field: FloatArray, outside: float) -> FloatArray:
+    """(rows, columns, 8): the field at the cell that each move leads to."""
+    rows, columns = field.shape
+    framed = np.full((rows + 2, columns + 2), outside)
+    framed[1:-1, 1:-1] = field
+    return np.stack([framed[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns] for dx, dy in MOVES], axis=2)
+
+
+def soft_values(reward: FloatArray, goal: Cell, sweeps: int = 30_000) -> FloatArray:
+    """Soft value iteration in the log domain: V(s) = log sum_a exp(r(s, a) + V(s')) until nothing moves."""
+    values = np.full(reward.shape[:2], -np.inf)
+    values[goal[1], goal[0]] = 0.0
+    for _ in range(sweeps):
+        before = values
+        values = logsumexp(reward + ahead(before, -np.inf), axis=2)
+        values[goal[1], goal[0]] = 0.0
+        known = np.isfinite(values)
+        if (known == np.isfinite(before)).all() and np.abs(values[known] - before[known]).max() < 1e-12:
+            return values
+    raise AssertionError("soft value iteration did not end: the partition function may be infinite")
+
+
+def soft_policy(reward: FloatArray, values: FloatArray) -> FloatArray:
+    """P(a|s) = exp(r + V' - V), (rows, columns, 8); zeros where nothing can be done."""
+    with np.errstate(invalid="ignore"):
+        logs = reward + ahead(values, -np.inf) - values[:, :, None]
+    return np.where(np.isfinite(reward) & np.isfinite(logs), np.exp(logs), 0.0)
+
+
+def expected_visits(policy: FloatArray, start: Cell, goal: Cell) -> FloatArray:
+    """Mass let go at the start and moved step by step until nothing is under way; visits are its sum over time."""
+    rows, columns = policy.shape[:2]
+    mass = np.zeros((rows, columns))
+    mass[start[1], start[0]] = 1.0
+    visits = mass.copy()
+    for _ in range(100_000):
+        framed = np.zeros((rows + 2, columns + 2))
+        for move, (dx, dy) in enumerate(MOVES):
+            framed[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns] += mass * policy[:, :, move]
+        mass = framed[1:-1, 1:-1]
+        visits += mass
+        mass = mass.copy()
+        mass[goal[1], goal[0]] = 0.0
+        if mass.sum() < 1e-16:
+            return visits
+    raise AssertionError("mass never arrives in the goal")
+
+
+# --- derivatives ----------------------------------------------------------------------------------------------------
+
+
+def derivative(function: Callable[[FloatArray], FloatArray], at: FloatArray, relative: float = 1e-3) -> FloatArray:
+    """Central finite differences of fourth order: (..., k) derivatives of a function of (k,) variables.
+
+    Of the value it is the gradient, of the gradient the Hessian.
+    """
+    columns = []
+    for j in range(len(at)):
+        step = np.zeros(len(at))
+        step[j] = relative * max(abs(at[j]), 0.1)
+        near = np.asarray(function(at + step)) - np.asarray(function(at - step))
+        far = np.asarray(function(at + 2 * step)) - np.asarray(function(at - 2 * step))
+        columns.append((8 * near - far) / (12 * step[j]))
+    return np.stack(columns, axis=-1)
+
+
+# --- worlds solved by hand ------------------------------------------------------------------------------------------
+
+
+class CorridorOfThree:
+    """Three cells of 0.1 m in a row: start A, middle B, goal G. A step's weight is w = exp(c0 0.1 m).
+
+    z_A = w z_B            from A the only move leads to B
+    z_B = w z_A + w        from B one leads back, one into the goal, where z = 1
+    hence z_B = w / (1 - w^2) and z_A = w^2 / (1 - w^2). We choose w = 1/2, that is c0 = -10 ln 2 /m:
+    """
+
+    C0 = -10 * log(2)
+    Z_A, Z_B = 1 / 3, 2 / 3
+    # P(G|B) = w / z_B = (1/2) / (2/3), and back with the rest.
+    TO_GOAL, BACK = 3 / 4, 1 / 4
+    # D_A = 1 + D_B / 4 (the start, and every way back); D_B = D_A (from A all go to B): D = 4/3 in both.
+    VISITS = 4 / 3
+    # log p(A B G) = log P(B|A) + log P(G|B) = 0 + log 3/4.
+    LOG_LIKELIHOOD = log(3 / 4)
+    # Every move drives 0.1 m. Demonstrated: 2 moves. Expected: D_A + D_B = 8/3 moves. Gradient by c0: their difference.
+    GRADIENT_C0 = 0.1 * (2 - 8 / 3)
+    # V_A = 2u - log(1 - e^2u) with u = log w. Its second derivative by u is 4 w^2 / (1 - w^2)^2 = 1 / (9/16).
+    HESSIAN_C0 = -(0.1**2) * 16 / 9
+    # Equally likely moves: one choice at A, two at B.
+    UNIFORM_LOG_LIKELIHOOD = log(1 / 1) + log(1 / 2)
+
+
+class SquareOfFour:
+    """2 x 2 cells of 0.1 m, start A and goal G in opposite corners, B and C in the other two.
+
+    A straight step weighs w = exp(c0 0.1 m), a diagonal one u = w^sqrt(2). By symmetry z_B = z_C = b, and z_A = a:
+        a = u + 2 w b              straight across into the goal, or to B or C
+        b = w + w a + u b          into the goal, back to A, or across to the other one
+    The second gives b = w (1 + a) / (1 - u); put into the first, a = (u + q) / (1 - q) with q = 2 w^2 / (1 - u).
+    """
+
+    @staticmethod
+    def z(c0: float) -> tuple[float, float]:
+        w = exp(c0 * 0.1)
+        u = w ** sqrt(2)
+        q = 2 * w**2 / (1 - u)
+        a = (u + q) / (1 - q)
+        return a, w * (1 + a) / (1 - u)
+
+
+# --- lines ----------------------------------------------------------------------------------------------------------
+
+
+def distance_to_segment(
+    point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]
+) -> tuple[float, tuple[float, float]]:
+    """Distance of a point to the segment from a to b, and the segment's point nearest to it."""
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    length_2 = ux * ux + uy * uy
+    share = 0.0 if length_2 == 0 else ((point[0] - a[0]) * ux + (point[1] - a[1]) * uy) / length_2
+    share = min(1.0, max(0.0, share))
+    near = (a[0] + share * ux, a[1] + share * uy)
+    return hypot(point[0] - near[0], point[1] - near[1]), near
+
+
+def rasterised(line_cells: FloatArray) -> list[Cell]:
+    """The study's rule on an (n, 2) line in units of cells, in which the cell (c, r) has its centre at (c, r).
+
+    Start in the first pose's cell; of the eight neighbours, never the one before, step to the one nearest to the rest
+    of the line; cut the line there; stop in the last pose's cell.
+    """
+    rest = [(float(x), float(y)) for x, y in line_cells]
+    cell, last = (tuple(int(np.floor(v + 0.5)) for v in rest[i]) for i in (0, -1))
+    path = [cell]
+    while cell != last:
+        best = None
+        for dx, dy in MOVES:
+            candidate = (cell[0] + dx, cell[1] + dy)
+            if len(path) > 1 and candidate == path[-2]:
+                continue
+            for number in range(len(rest) - 1):
+                distance, near = distance_to_segment(candidate, rest[number], rest[number + 1])
+                if best is None or distance < best[0]:
+                    best = distance, candidate, near, number
+        _, cell, near, number = best
+        rest = [near, *rest[number + 1 :]]
+        path.append(cell)
+        assert len(path) < 10_000, "the rule walks in circles"
+    return path
+
+
+def area_by_raster(line_m: FloatArray, nominal_m: FloatArray, cell_m: float) -> float:
+    """Area between two lines: small squares whose centre lies inside the closed curve of both (even-odd rule)."""
+    ring = np.concatenate([line_m, nominal_m[::-1], line_m[:1]])
+    low, high = ring.min(axis=0) - cell_m, ring.max(axis=0) + cell_m
+    x = np.arange(low[0], high[0], cell_m)[None, :]
+    y = np.arange(low[1], high[1], cell_m)[:, None]
+    inside = np.zeros((y.size, x.size), dtype=bool)
+    for (x0, y0), (x1, y1) in pairwise(ring):
+        if y0 == y1:
+            continue
+        crossed = (y0 > y) != (y1 > y)
+        inside ^= crossed & (x < x0 + (y - y0) / (y1 - y0) * (x1 - x0))
+    return float(inside.sum()) * cell_m**2
+
+
+def distance_by_sampling(line_m: FloatArray, people_m: FloatArray, per_segment: int = 20_000) -> float:
+    """Least distance of many points along a line to any person."""
+    shares = np.linspace(0, 1, per_segment)[:, None]
+    points = np.concatenate([a + shares * (b - a) for a, b in pairwise(line_m)])
+    return min(float(np.hypot(*(points - person).T).min()) for person in people_m)
+
+
+def length_by_steps(line_m: FloatArray) -> float:
+    return sum(hypot(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in pairwise(line_m))
+
+
+def best_on_ball(gradient: FloatArray, hessian: FloatArray, radius: float) -> float:
+    """Largest value of g.p + p.H.p/2 over |p| <= radius, over many directions (k = 2 or 3) and all lengths."""
+    if len(gradient) == 2:
+        angles = np.linspace(-np.pi, np.pi, 40_001)
+        directions = np.stack([np.cos(angles), np.sin(angles)])
+    else:
+        turns = 20_000  # a spiral from pole to pole
+        heights = np.linspace(-1, 1, 200_001)
+        across = np.sqrt(1 - heights**2)
+        directions = np.stack([across * np.cos(turns * heights), across * np.sin(turns * heights), heights])
+    slope = gradient @ directions
+    bend = np.einsum("ik,ij,jk->k", directions, hessian, directions)
+    peak = np.where(bend < 0, np.clip(-slope / np.where(bend < 0, bend, -1.0), 0, radius), radius)
+    return float(max((slope * length + bend * length**2 / 2).max() for length in (peak, np.full_like(peak, radius))))

@@ -1,0 +1,226 @@
+"""From a recording to demonstrations, on a small log whose every number is known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from robot_log import DRIVE_S, LENGTH_M, PUSH_N, PUSH_S, STAND_S, START_NS, Run, position_m, write_run
+
+from navirl_cli.demos.contact import PushSettings, hysteresis, pushes_of, quiet_bias
+from navirl_cli.demos.demonstration import Condition
+from navirl_cli.demos.extract import ExtractSettings, extract, numbered
+from navirl_cli.demos.trials import Split, trials_of
+from navirl_cli.errors import DemonstrationError, LogError
+from navirl_cli.logs.load import load_recording
+
+GOAL_S = 1.5
+
+
+@pytest.fixture
+def make(tmp_path):
+    def recording(**changes):
+        path = tmp_path / "run.mcap"
+        path.unlink(missing_ok=True)
+        return load_recording(write_run(path, replace(Run(), **changes)))
+
+    return recording
+
+
+def one(recording, **settings):
+    (demonstration,) = extract(recording, ExtractSettings(**settings)).demonstrations
+    return demonstration
+
+
+def test_poses_come_into_the_map_frame_through_tf(make):
+    recording = make()
+    seconds = (recording.t_ns - START_NS) / 1e9
+    assert recording.xy_m == pytest.approx(position_m(seconds), abs=1e-9)
+    assert recording.yaw_rad == pytest.approx(0.0, abs=1e-9)
+    assert recording.goal_m == pytest.approx(np.array([[4.0, 0.0]]))
+    assert recording.people_m[0] == pytest.approx(np.array([[2.0, 0.9]]))
+
+
+def test_a_trial_becomes_a_demonstration(make):
+    d = one(make())
+    assert (d.id, d.participant, d.condition, d.corrected, d.cycle) == ("run/1", "run", Condition.FORCE, True, None)
+    assert d.start_ns == pytest.approx(START_NS + GOAL_S * 1e9, abs=34e6)
+    assert d.xy_m[-1] == pytest.approx([LENGTH_M, 0.0], abs=0.02)
+    assert d.duration_s == pytest.approx(STAND_S - GOAL_S + DRIVE_S, abs=0.3)
+    assert d.cells[0].tolist() == d.grid.cells_of([0.0, 0.0]).tolist()
+    assert d.cells[-1].tolist() == d.grid.cells_of(d.xy_m[-1]).tolist()
+    assert len(d.cells) == pytest.approx(41, abs=1)
+    assert d.goal_m == (4.0, 0.0)
+
+
+def test_the_push_is_found_with_its_force_in_the_map_frame(make):
+    d = one(make())
+    (contact,) = d.contacts
+    assert contact.start_s == pytest.approx(PUSH_S[0] - GOAL_S, abs=0.1)
+    assert contact.end_s == pytest.approx(PUSH_S[1] - GOAL_S, abs=0.1)
+    assert contact.impulse_ns == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
+    assert contact.direction_rad == pytest.approx(np.pi / 2, abs=0.03)
+    assert contact.peak_n == pytest.approx(12.0, abs=1.0)
+    quiet = (d.t_s < 3) | (d.t_s > 6)
+    assert np.abs(d.force_n[quiet].mean(axis=0)).max() < 0.05
+
+
+def test_the_bias_is_found_beside_long_pushes():
+    rng = np.random.default_rng(2)
+    force = rng.normal(0, 0.2, (6000, 3)) + np.array([4.0, -1.0, -7.0])
+    for start in (500, 2000, 4000):  # a quarter of the time under steady pushes
+        force[start : start + 500] += (20.0, 5.0, 0.0)
+    bias, quiet = quiet_bias(force, 100.0)
+    assert bias == pytest.approx([4.0, -1.0, -7.0], abs=0.03)
+    assert not quiet[600:900].any()
+
+
+def test_hysteresis_by_hand():
+    size = np.array([0, 2, 1, 4, 2, 0.5, 2, 2, 0, 5.0])
+    assert hysteresis(size, 3.0, 0.9).tolist() == [[1, 4], [9, 9]]
+    assert hysteresis(size, 9.0, 1.0).shape == (0, 2)
+    assert hysteresis(np.array([5.0, 5.0]), 3.0, 1.0).tolist() == [[0, 1]]
+
+
+def test_a_threshold_within_the_noise_is_told(make):
+    settings = ExtractSettings(push=PushSettings(begins_n=0.2))
+    (note,) = extract(make(), settings).notes
+    assert note.startswith("run.mcap: without contact the force still shakes by 0.0")
+    assert "contacts from 0.2 N on may be noise; raise --contact-force to 0." in note
+
+
+def test_a_threshold_above_the_push_leaves_no_contact(make):
+    d = one(make(), push=PushSettings(begins_n=30.0))
+    assert d.contacts == ()
+    assert (d.condition, d.corrected) == (Condition.AUTONOMOUS, False)
+
+
+def test_a_deflected_joystick_makes_a_joystick_trial(make):
+    d = one(make(joystick=True))
+    assert (d.condition, d.corrected) == (Condition.JOYSTICK, True)
+
+
+def test_the_session_record_says_participant_cycle_and_condition(make):
+    entry = {"t_ns": START_NS + 1_500_000_000, "cycle": 2, "condition": "force"}
+    d = one(make(session={"participant": "ann", "trials": json.dumps([entry])}))
+    assert (d.id, d.cycle, d.condition) == ("ann/1", 2, Condition.FORCE)
+    assert one(make(), participant="bob").id == "bob/1"
+
+
+@pytest.mark.parametrize("trials", ["no json", '{"t_ns": 1}', '[{"cycle": 1}]', "[1]"])
+def test_a_broken_session_record_is_told(make, trials):
+    with pytest.raises(LogError, match=r"run\.mcap: metadata record navirl\.session, key trials: expected a JSON list"):
+        make(session={"trials": trials})
+
+
+def test_an_unknown_condition_is_told_and_the_trial_skipped(make):
+    entry = {"t_ns": START_NS, "condition": "telepathy"}
+    with pytest.raises(DemonstrationError, match=r"unknown condition 'telepathy'.* known are force, joystick, autonom"):
+        extract(make(session={"trials": json.dumps([entry])}), ExtractSettings())
+
+
+def test_saying_the_same_goal_again_starts_no_trial(make):
+    goals = ((1.5, 4.0, 0.0), (4.0, 4.0, 0.01), (6.0, 4.01, 0.0))
+    assert len(trials_of(make(goals=goals), Split.GOAL)) == 1
+
+
+def test_a_new_goal_on_the_way_starts_a_trial(make):
+    extraction = extract(make(goals=((1.5, 4.0, 1.0), (7.0, 4.0, 0.0))), ExtractSettings())
+    first, second = extraction.demonstrations
+    assert first.xy_m[-1, 0] == pytest.approx(2.0, abs=0.05)
+    assert "ended 2.25 m from its goal" in first.notes[0]
+    assert second.xy_m[0, 0] == pytest.approx(2.0, abs=0.05)
+    assert second.notes == ()
+    assert [d.id for d in extraction.demonstrations] == ["run/1", "run/2"]
+
+
+def test_a_goal_that_cannot_be_reached_is_told(make):
+    for goal in ((1.5, 40.0, 0.0), (1.5, 3.0, 1.2)):
+        walls = tuple((column, 25) for column in range(60))
+        with pytest.raises(DemonstrationError, match=r"goal unreachable: no free way on the map from x -?0\.00 m"):
+            extract(make(goals=(goal,), obstacles=walls), ExtractSettings(robot_radius_m=0.2))
+
+
+def test_splits_at_rests_and_none(make):
+    recording = make(goals=())
+    (trial,) = trials_of(recording, Split.STOP)
+    seconds = (recording.t_ns[[trial.first, trial.stop - 1]] - START_NS) / 1e9
+    assert seconds == pytest.approx([STAND_S, STAND_S + DRIVE_S], abs=0.3)
+    d = one(recording, split=Split.NONE)
+    assert d.duration_s == pytest.approx(14.0, abs=0.1)
+    assert d.goal_m == pytest.approx((LENGTH_M, 0.0))
+
+
+def test_goal_and_people_can_be_said(make):
+    d = one(make(goals=(), people=None), goal_m=(4.0, 0.0), people_m=((2.0, -1.0), (1.0, 1.0)))
+    assert d.goal_m == (4.0, 0.0)
+    assert d.people_m.tolist() == [[2.0, -1.0], [1.0, 1.0]]
+    assert d.notes == ()
+    assert "no people in the scene; say where they stand with --person x,y" in one(make(people=None)).notes
+
+
+def test_without_goals_the_error_says_what_to_do(make):
+    with pytest.raises(DemonstrationError, match=r"no goal is announced.* --goal x,y, or choose --split stop"):
+        extract(make(goals=()), ExtractSettings())
+
+
+def test_driven_cells_that_the_map_calls_occupied_are_freed_and_counted(make):
+    # A wall of one cell 0.2 m beside the way: grown by 0.3 m it covers the way.
+    recording = make(obstacles=((30, 17),))
+    d = one(recording)
+    walled = one(recording, robot_radius_m=0.05)
+    assert walled.notes == ()
+    (note,) = d.notes
+    count = int(note.split()[0])
+    # Of the way's cells those nearer than 0.3 m to it: |dx| < sqrt(0.05) = 0.22 m.
+    assert note == f"{count} driven cells that the map calls occupied were freed"
+    assert count == 5
+    assert not d.grid.is_occupied(d.cells).any()
+
+
+def test_a_loop_that_the_rule_cuts_off_is_told(make):
+    recording = make()
+    turn = np.linspace(0, 2 * np.pi, 60)
+    loop = np.stack([2 + 0.8 * np.sin(turn), 0.8 - 0.8 * np.cos(turn)], axis=1)
+    way = np.concatenate([recording.xy_m[60:210], loop, recording.xy_m[210:]])
+    times = recording.t_ns[0] + np.arange(len(way)) * 33_000_000
+    changed = replace(recording, t_ns=times, xy_m=way, yaw_rad=np.zeros(len(way)), goal_t_ns=times[:1])
+    assert one(changed).notes == ("its path on the grid is much shorter than the driven one: the rule cuts loops off",)
+    shaking = recording.xy_m + np.random.default_rng(0).normal(0, 0.004, recording.xy_m.shape)
+    assert one(replace(recording, xy_m=shaking)).notes == ()
+
+
+def test_a_person_on_the_start_is_refused(make):
+    with pytest.raises(DemonstrationError, match=r"a person at x 0\.10 m, y 0\.00 m stands on the path's start"):
+        extract(make(people=((0.1, 0.0),)), ExtractSettings())
+
+
+def test_a_robot_that_does_not_move_is_an_empty_trial(make):
+    with pytest.raises(DemonstrationError, match=r"no trial became a demonstration: .*an empty trial"):
+        extract(make(moves=False), ExtractSettings())
+
+
+def test_a_path_beyond_the_map_is_told(make):
+    recording = make()
+    small = replace(recording.occupancy, data=recording.occupancy.data[:, :30])
+    with pytest.raises(DemonstrationError, match=r"cells of the path lie beyond the map, the first at x 2\.00 m"):
+        extract(replace(recording, occupancy=small), ExtractSettings())
+
+
+def test_another_resolution_gives_other_cells(make):
+    d = one(make(), resolution_m=0.2)
+    assert d.grid.resolution_m == 0.2
+    assert len(d.cells) == pytest.approx(21, abs=1)
+
+
+def test_too_few_wrench_messages(make):
+    recording = make()
+    short = replace(recording.wrench, t_ns=recording.wrench.t_ns[:10], force_n=recording.wrench.force_n[:10])
+    with pytest.raises(LogError, match="expected a wrench of at least 50 messages, found 10"):
+        pushes_of(replace(recording, wrench=short), PushSettings())
+
+
+def test_numbers_go_on_over_the_logs_of_a_participant(make):
+    d = one(make())
+    other = replace(d, participant="eve")
+    assert [n.id for n in numbered([d, other, d])] == ["run/1", "eve/1", "run/2"]
