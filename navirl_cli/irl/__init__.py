@@ -1,0 +1,1 @@
+"""Scene, reward, soft values and visits, likelihood with its derivatives, fit, and paths from a policy."""

@@ -1,0 +1,124 @@
+"""The free cells of a grid as a graph: who is whose neighbour, and shortest ways along it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import MOVES, FloatArray, Grid, IntArray
+from navirl_cli.errors import SceneError
+
+#: The move that undoes each of MOVES.
+OPPOSITE: IntArray = np.array([4, 5, 6, 7, 0, 1, 2, 3], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """The connected free cells of a grid, numbered, with their eight moves."""
+
+    grid: Grid
+    #: (n, 2) column and row of every state.
+    cells: IntArray
+    #: (rows, columns) number of the state, -1 where there is none.
+    index: IntArray
+    #: (n, 8) the state that each move leads to, -1 where the move is not possible.
+    neighbours: IntArray
+
+    @staticmethod
+    def around(grid: Grid, cell: IntArray) -> "Lattice":
+        """All cells that can be reached from one.
+
+        Args:
+            grid: The map.
+            cell: (2,) column and row of a free cell.
+
+        Raises:
+            SceneError: The cell is occupied or beyond the map.
+        """
+        if grid.is_occupied(cell):
+            x, y = grid.centres_of(cell)
+            raise SceneError(f"the cell at x {x:.2f} m, y {y:.2f} m is not free on the map, so no path can pass it")
+        rows, columns = np.nonzero(grid.connected_to(cell))
+        cells = np.stack([columns, rows], axis=1)
+        index = np.full(grid.shape, -1, dtype=np.int64)
+        index[rows, columns] = np.arange(len(cells))
+        framed = np.pad(index, 1, constant_values=-1)
+        neighbours = np.stack([framed[rows + 1 + dy, columns + 1 + dx] for dx, dy in MOVES], axis=1)
+        return Lattice(grid, cells, index, neighbours)
+
+    @property
+    def size(self) -> int:
+        """Number of states n."""
+        return len(self.cells)
+
+    @cached_property
+    def step_m(self) -> FloatArray:
+        """(8,) length of every move, m."""
+        lengths: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1]) * self.grid.resolution_m
+        return lengths
+
+    @cached_property
+    def xy_m(self) -> FloatArray:
+        """(n, 2) centre of every state, m, map frame."""
+        return self.grid.centres_of(self.cells)
+
+    @cached_property
+    def possible(self) -> NDArray[np.bool_]:
+        """(n, 8) whether a move is possible."""
+        return self.neighbours >= 0
+
+    @cached_property
+    def edges(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Source, move and target of every possible step, each (m,), by source."""
+        source, move = np.nonzero(self.possible)
+        return source, move, self.neighbours[source, move]
+
+    def states_of(self, cells: IntArray) -> IntArray:
+        """Numbers of (k, 2) cells; -1 for cells that are occupied, unconnected or beyond the map."""
+        inside = self.grid.contains(cells)
+        states = np.full(len(cells), -1, dtype=np.int64)
+        states[inside] = self.index[cells[inside, 1], cells[inside, 0]]
+        return states
+
+    def costs_to(self, goal: int, cost: FloatArray) -> FloatArray:
+        """Cost of the cheapest way from every state to the goal (Dijkstra).
+
+        Args:
+            goal: A state.
+            cost: Broadcastable to (n, 8), positive, of each possible move.
+
+        Returns:
+            (n,) costs.
+        """
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import dijkstra
+
+        _, move, target = self.edges
+        # The way to the goal is the way from the goal on reversed edges; every edge s -> s' has its reverse s' -> s,
+        # so that the reversed graph has the same pattern with the costs of the opposite moves.
+        reverse = np.broadcast_to(cost, self.neighbours.shape)[target, OPPOSITE[move]]
+        starts = np.concatenate([[0], np.cumsum(self.possible.sum(axis=1))]).astype(np.int32)
+        graph = csr_array((reverse, target.astype(np.int32), starts), shape=(self.size, self.size))
+        found: FloatArray = dijkstra(graph, indices=goal)
+        return found
+
+    def descend(self, start: int, goal: int, cost: FloatArray) -> IntArray:
+        """States along one cheapest way, start and goal included.
+
+        Args:
+            start: A state.
+            goal: A state.
+            cost: Broadcastable to (n, 8), positive.
+
+        Returns:
+            (k,) states.
+        """
+        to_go = self.costs_to(goal, cost)
+        full = np.where(self.possible, np.broadcast_to(cost, self.neighbours.shape), np.inf)
+        path = [start]
+        while path[-1] != goal:
+            here = path[-1]
+            best = int(np.argmin(full[here] + to_go[self.neighbours[here]]))
+            path.append(int(self.neighbours[here, best]))
+        return np.array(path)

@@ -1,0 +1,152 @@
+"""A trust-region Newton method within bounds, for few variables and exact second derivatives.
+
+Variables on a bound stay there only while the gradient pushes outward, so that a bound is let go as soon as the
+objective gains by it; the trust-region step is exact (one small eigenvalue problem), hence directions of negative
+curvature are followed and not stuck at.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import FloatArray
+
+MAX_ITERATIONS = 200
+#: The Newton step promises less than this gain, in nats: the optimum is reached for every purpose.
+GAIN_TOLERANCE = 1e-9
+MAX_RADIUS = 16.0
+#: A region this small (in units of the variables) means that the objective contradicts its derivatives.
+MIN_RADIUS = 1e-12
+
+
+@dataclass(frozen=True)
+class Point:
+    """The objective at one place; value -inf where it does not exist."""
+
+    x: FloatArray
+    value: float
+    gradient: FloatArray
+    hessian: FloatArray
+
+
+@dataclass(frozen=True)
+class Maximum:
+    """Where the search ended."""
+
+    best: Point
+    #: True where the promised gain fell below the tolerance.
+    converged: bool
+    evaluations: int
+    #: Accepted points in order, the start first.
+    path: tuple[Point, ...]
+
+
+def maximise(
+    objective: Callable[[FloatArray], Point],
+    start: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    free: NDArray[np.bool_],
+    progress: Callable[[Point], None] | None = None,
+) -> Maximum:
+    """Climb to a local maximum.
+
+    Args:
+        objective: Value, gradient and Hessian at (k,) variables; value -inf where it does not exist.
+        start: (k,) within the bounds; the objective must exist there.
+        lower: (k,) bounds.
+        upper: (k,) bounds.
+        free: (k,) variables that may move.
+        progress: Called with every accepted point.
+
+    Returns:
+        The maximum and the way to it.
+    """
+    here = objective(np.clip(start, lower, upper))
+    path, evaluations, radius = [here], 1, 1.0
+    while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
+        step = _step(here, lower, upper, free, radius)
+        promised = _promise(here, step)
+        # A step that the region holds back promises little because it is short, not because the top is near.
+        if promised < GAIN_TOLERANCE and np.linalg.norm(step) < 0.9 * radius:
+            return Maximum(here, True, evaluations, tuple(path))
+        # A variable that meets its bound stands on it, not a rounding beside it.
+        onto = np.where(step == lower - here.x, lower, np.where(step == upper - here.x, upper, here.x + step))
+        there = objective(onto)
+        evaluations += 1
+        gained = there.value - here.value
+        if not gained > 0.25 * promised:
+            radius = 0.25 * float(np.linalg.norm(step))
+        elif gained > 0.75 * promised and np.linalg.norm(step) > 0.8 * radius:
+            radius = min(2 * radius, MAX_RADIUS)
+        # Below the rounding of the sum a gain cannot be told from noise, and a Newton step is trusted.
+        noise = 1e-12 * abs(here.value)
+        if gained > 0.05 * promised or (promised < noise and gained > -noise):
+            here = there
+            path.append(here)
+            if progress is not None:
+                progress(here)
+    return Maximum(here, False, evaluations, tuple(path))
+
+
+def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bool_], radius: float) -> FloatArray:
+    """A step that raises the quadratic model within region and bounds.
+
+    It heads for the model's best place in the region and stops at the first bound, where it heads for the best place
+    along the bound, and so on; of the places on the way the best is taken, so that a bound never costs the ascent.
+    """
+    outward = ((here.x <= lower) & (here.gradient < 0)) | ((here.x >= upper) & (here.gradient > 0))
+    moving = free & ~outward
+    low, high = lower - here.x, upper - here.x
+    step = best = np.zeros_like(here.x)
+    while moving.any():
+        gradient = here.gradient[moving] + here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
+        left = np.sqrt(max(radius**2 - float(step[~moving] @ step[~moving]), 0.0))
+        way = np.zeros_like(step)
+        way[moving] = _region_step(gradient, here.hessian[np.ix_(moving, moving)], left) - step[moving]
+        room = np.full_like(step, np.inf)
+        room[way > 0] = (high - step)[way > 0] / way[way > 0]
+        room[way < 0] = (low - step)[way < 0] / way[way < 0]
+        met = room <= min(float(room.min()), 1.0)
+        step = np.where(met, np.where(way > 0, high, low), step + min(float(room.min()), 1.0) * way)
+        if _promise(here, step) > _promise(here, best):
+            best = step
+        if not met.any():
+            break
+        moving &= ~met
+    return best
+
+
+def _promise(here: Point, step: FloatArray) -> float:
+    """Gain of the quadratic model."""
+    return float(here.gradient @ step + 0.5 * step @ here.hessian @ step)
+
+
+def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> FloatArray:
+    """argmax of g.p + p.H.p/2 over |p| <= radius (Nocedal and Wright, Numerical Optimization, Sec. 4.3)."""
+    curvature, basis = np.linalg.eigh(hessian)
+    slope = basis.T @ gradient
+    steepest = float(curvature[-1])
+    if steepest < 0:
+        step = -slope / curvature
+        if float(step @ step) <= radius**2:
+            full: FloatArray = basis @ step
+            return full
+    # |p(shift)| falls from infinity to 0 as the shift grows; bisect its logarithm above the largest curvature.
+    floor = max(steepest, 0.0)
+    low, high = floor * (1 + 1e-15) + 1e-14, floor + float(np.linalg.norm(slope)) / max(radius, 1e-100) + 1e-12
+    for _ in range(80):
+        middle = floor + np.sqrt((low - floor) * (high - floor)) if low > floor else 0.5 * (low + high)
+        step = slope / (middle - curvature)
+        if float(step @ step) > radius**2:
+            low = middle
+        else:
+            high = middle
+    step = slope / (high - curvature)
+    rest = radius**2 - float(step @ step)
+    if steepest >= 0 and rest > 0 and abs(slope[-1]) < 1e-12:
+        step[-1] = np.sqrt(rest)  # the hard case: a saddle is left along its steepest direction
+    edge: FloatArray = basis @ step
+    return edge

@@ -1,0 +1,74 @@
+"""Paths drawn from a policy, all at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.errors import RewardError
+from navirl_cli.irl.values import Policy
+
+#: A path this many times longer (in steps) than the expected one does not occur in any sample a user can draw.
+PATIENCE = 1000
+
+
+@dataclass(frozen=True)
+class SampledPaths:
+    """Paths of a policy from a start into the goal."""
+
+    #: (paths, longest) states; after its arrival a path stays in the goal.
+    states: IntArray
+    #: (paths,) number of states up to and with the goal.
+    lengths: IntArray
+
+    def __len__(self) -> int:
+        """Number of paths."""
+        return len(self.lengths)
+
+    def path(self, number: int) -> IntArray:
+        """(k,) states of one path, start and goal included."""
+        return self.states[number, : self.lengths[number]]
+
+
+def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generator) -> SampledPaths:
+    """Draw paths from a policy.
+
+    Args:
+        policy: The policy.
+        start: State in which every path starts.
+        count: Number of paths.
+        rng: Source of randomness.
+
+    Returns:
+        The paths.
+
+    Raises:
+        RewardError: A path does not arrive within a thousand times the expected number of steps.
+    """
+    ones = np.ones(policy.lattice.size)
+    ones[policy.goal] = 0.0
+    limit = int(PATIENCE * policy.expected_to_goal(ones)[start]) + 100
+    # Rounding leaves the last sum a little off 1; no draw may fall behind it.
+    threshold = np.cumsum(policy.probability, axis=1)
+    threshold /= np.maximum(threshold[:, -1:], 1e-300)
+    here = np.full(count, start)
+    columns = [here]
+    for _ in range(limit):
+        driving = np.flatnonzero(here != policy.goal)
+        if len(driving) == 0:
+            break
+        move = (rng.random(len(driving))[:, None] >= threshold[here[driving]]).sum(axis=1)
+        here = here.copy()
+        here[driving] = policy.lattice.neighbours[here[driving], move]
+        columns.append(here)
+    else:
+        raise RewardError(
+            f"a sampled path wandered for {limit} steps without reaching the goal: the cost of way is too low"
+        )
+    states = np.stack(columns, axis=1)
+    return SampledPaths(states, (states != policy.goal).sum(axis=1) + 1)
+
+
+def sampled_lines_m(policy: Policy, paths: SampledPaths) -> list[FloatArray]:
+    """Every path as a (k, 2) line through the centres of its cells, m, map frame."""
+    return [policy.lattice.xy_m[paths.path(number)] for number in range(len(paths))]

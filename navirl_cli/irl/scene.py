@@ -1,0 +1,168 @@
+"""What a robot plans in: a map, a start, a goal, people, and the nominal path between start and goal."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.errors import SceneError
+from navirl_cli.irl.lattice import Lattice
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One planning problem of the decision process (Sec. III-B): states, start, goal and people."""
+
+    lattice: Lattice
+    #: Numbers of the states.
+    start: int
+    goal: int
+    #: (p, 2) m, map frame.
+    people_m: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check that start and goal differ."""
+        if self.start == self.goal:
+            x, y = self.lattice.xy_m[self.start]
+            raise SceneError(
+                f"start and goal lie in the same cell at x {x:.2f} m, y {y:.2f} m: there is nothing to plan"
+            )
+
+    @staticmethod
+    def on(
+        grid: Grid, start: IntArray, goal: IntArray, people_m: FloatArray, lattice: Lattice | None = None
+    ) -> "Scene":
+        """Build a scene from cells.
+
+        Args:
+            grid: Free cells for the robot's centre.
+            start: (2,) column and row.
+            goal: (2,) column and row.
+            people_m: (p, 2) m, map frame.
+            lattice: The lattice around the start, where one is known already.
+
+        Raises:
+            SceneError: Start or goal is not free, or no way leads from one to the other.
+        """
+        lattice = Lattice.around(grid, start) if lattice is None else lattice
+        first, last = (int(state) for state in lattice.states_of(np.stack([start, goal])))
+        if first < 0 or last < 0:
+            (x0, y0), (x1, y1) = grid.centres_of(start), grid.centres_of(goal)
+            raise SceneError(
+                f"goal unreachable: no free way on the map from x {x0:.2f} m, y {y0:.2f} m to x {x1:.2f} m, "
+                f"y {y1:.2f} m; check the map, the goal and the robot's radius"
+            )
+        return Scene(lattice, first, last, np.asarray(people_m, dtype=float).reshape(-1, 2))
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for scenes that have the same policy."""
+        return self.lattice.grid.digest, self.start, self.goal, self.people_m.tobytes()
+
+    @cached_property
+    def nominal(self) -> NDArray[np.bool_]:
+        """(n,) cells on any shortest obstacle-free 8-connected path from start to goal."""
+        step = self.lattice.step_m
+        from_start, to_goal = self.lattice.costs_to(self.start, step), self.lattice.costs_to(self.goal, step)
+        shortest = to_goal[self.start]
+        # Sums of many steps in different order differ in their last digits.
+        on_path: NDArray[np.bool_] = from_start + to_goal <= shortest * (1 + 1e-9)
+        return on_path
+
+    @cached_property
+    def deviation_m(self) -> FloatArray:
+        """(n,) distance d(s) of every cell's centre to the nearest cell of the nominal path, m (Eq. 12)."""
+        from scipy.ndimage import distance_transform_edt
+
+        away = np.ones(self.lattice.grid.shape, dtype=bool)
+        columns, rows = self.lattice.cells[self.nominal].T
+        away[rows, columns] = False
+        distance = distance_transform_edt(away) * self.lattice.grid.resolution_m
+        deviation: FloatArray = distance[self.lattice.cells[:, 1], self.lattice.cells[:, 0]]
+        return deviation
+
+    def nominal_line_m(self) -> FloatArray:
+        """The nominal path as a line: a shortest way, pulled straight where no obstacle is in between.
+
+        Returns:
+            (k, 2) m, map frame, from the start's centre to the goal's.
+        """
+        states = self.hugging_path()
+        line, here = [0], 0
+        while here < len(states) - 1:
+            ahead = len(states) - 1
+            while ahead > here + 1 and not self._sees(states[here], states[ahead]):
+                ahead -= 1
+            line.append(ahead)
+            here = ahead
+        corners: FloatArray = self.lattice.xy_m[states[line]]
+        return corners
+
+    def hugging_path(self) -> IntArray:
+        """(k,) states of the shortest path that keeps nearest to the straight line from start to goal."""
+        xy = self.lattice.xy_m - self.lattice.xy_m[self.start]
+        ahead = self.lattice.xy_m[self.goal] - self.lattice.xy_m[self.start]
+        aside = np.abs(xy[:, 0] * ahead[1] - xy[:, 1] * ahead[0]) / np.hypot(*ahead)
+        # Small enough never to make a longer path the cheaper one.
+        tie_break = 1e-8 * aside[:, None] * self.lattice.grid.resolution_m
+        return self.lattice.descend(self.start, self.goal, self.lattice.step_m + tie_break)
+
+    def _sees(self, one: int, other: int) -> bool:
+        """Whether the straight line between two states passes free cells only."""
+        ends = self.lattice.xy_m[[one, other]]
+        length = float(np.hypot(*(ends[1] - ends[0])))
+        count = max(2, int(np.ceil(length / self.lattice.grid.resolution_m * 8)))
+        points = ends[0] + np.linspace(0, 1, count)[:, None] * (ends[1] - ends[0])
+        return not self.lattice.grid.is_occupied(self.lattice.grid.cells_of(points)).any()
+
+
+def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
+    """The path of a planner that takes people for obstacles and knows nothing else of them.
+
+    It keeps to the straight way as long as the detour grows no longer by it, as a local planner does that meets an
+    obstacle only when it is near.
+
+    Args:
+        scene: The scene.
+        clearance_m: Distance that the robot's centre keeps from a person's, m.
+
+    Returns:
+        (k, 2) m, map frame.
+
+    Raises:
+        SceneError: With the people as obstacles no way is left.
+    """
+    grid = scene.lattice.grid.inflated(clearance_m, scene.people_m)
+    blocked = Scene.on(grid, scene.lattice.cells[scene.start], scene.lattice.cells[scene.goal], scene.people_m)
+    line: FloatArray = blocked.lattice.xy_m[blocked.hugging_path()]
+    return line
+
+
+def scenes_of(demonstrations: Iterable[Demonstration]) -> list[Scene]:
+    """The scene of every demonstration; equal scenes are one object, wherever they stand in the list.
+
+    The goal of a scene is the cell in which the trial ended, as in the study: a demonstration is a path into its
+    absorbing goal.
+
+    Raises:
+        SceneError: As in :meth:`Scene.on`, naming the demonstration.
+    """
+    lattices: dict[str, list[Lattice]] = {}
+    known: dict[tuple[object, ...], Scene] = {}
+    scenes = []
+    for demonstration in demonstrations:
+        first, last = demonstration.cells[0], demonstration.cells[-1]
+        built = lattices.setdefault(demonstration.grid.digest, [])
+        lattice = next((one for one in built if one.states_of(first[None])[0] >= 0), None)
+        try:
+            scene = Scene.on(demonstration.grid, first, last, demonstration.people_m, lattice)
+        except SceneError as error:
+            raise SceneError(f"demonstration {demonstration.id}: {error}") from error
+        if lattice is None:
+            built.append(scene.lattice)
+        scenes.append(known.setdefault(scene.key, scene))
+    return scenes

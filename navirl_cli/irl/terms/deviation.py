@@ -1,0 +1,19 @@
+"""The cost of leaving the nominal path: a_g d(s)^2 (Eq. 12)."""
+
+from collections.abc import Sequence
+
+from navirl_cli.irl.scene import Scene
+from navirl_cli.irl.terms.term import Jet, Parameter
+
+
+class Deviation:
+    """Each step costs the squared distance of its cell to the nominal path."""
+
+    parameters = (
+        Parameter("a_g", "1/m^2", -1e4, 0.0, 1.0, -0.01, "reward per step and squared metre from the nominal path"),
+    )
+
+    def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
+        """Value and derivative by cell."""
+        squared = scene.deviation_m[:, None] ** 2
+        return Jet(theta[0] * squared, [squared])

@@ -1,0 +1,27 @@
+"""The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 13)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from navirl_cli.irl.scene import Scene
+from navirl_cli.irl.terms.term import Jet, Parameter
+
+
+class PersonalSpace:
+    """Each step costs for being near to people; several people add up."""
+
+    parameters = (
+        Parameter("a_p", "", -1e4, 1e4, 1.0, -5.0, "reward per step at a person's place"),
+        Parameter("sigma_p", "1/m^2", 1e-3, 1e3, 1.0, 2.0, "decay of the personal space with squared distance"),
+    )
+
+    def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
+        """Value and derivatives by cell."""
+        a_p, sigma_p = theta
+        squared = ((scene.lattice.xy_m[:, None, :] - scene.people_m[None, :, :]) ** 2).sum(axis=2)
+        bump = np.exp(-sigma_p * squared)
+        zeroth, first, second = (
+            (bump * squared**power).sum(axis=1)[:, None] for power in (0, 1, 2)
+        )  # moments over people: exp(..), d^2 exp(..), d^4 exp(..)
+        return Jet(a_p * zeroth, [zeroth, -a_p * first], {(0, 1): -first, (1, 1): a_p * second})

@@ -1,0 +1,51 @@
+"""What a term of the reward is: parameters, and a value with its derivatives on a scene."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.irl.scene import Scene
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a reward."""
+
+    name: str
+    #: SI unit as printed, empty for a pure number.
+    unit: str
+    #: Closed interval of admissible values.
+    lower: float
+    upper: float
+    #: The value in the unit above that counts as 1 for regularisation and step lengths.
+    scale: float
+    #: Where a fit starts when nothing else is said (the study's initial values).
+    initial: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Jet:
+    """Value and derivatives of a term on a scene.
+
+    Every array broadcasts to (n, 8), states by moves: (n, 1) for what depends on the cell that is left, (1, 8) for what
+    depends on the move alone.
+    """
+
+    value: FloatArray
+    #: By parameter of the term.
+    first: Sequence[FloatArray]
+    #: By pair (j, k), j <= k, of the term's parameters; a missing pair is zero everywhere.
+    second: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
+
+
+class Term(Protocol):
+    """A summand of the reward."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The term's parameters in order."""
+
+    def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
+        """Value and derivatives with respect to the term's parameters, in reward per step."""

@@ -1,0 +1,146 @@
+"""Fits: known truth found again, what the data do not tell, bounds, and what is refused."""
+
+import factories as make
+import numpy as np
+import pytest
+
+from navirl_cli.errors import RewardError
+from navirl_cli.irl.fit import Status, fit
+from navirl_cli.irl.likelihood import evidence_of, likelihood, log_likelihood
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.values import InfinitePartitionError
+
+TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
+START = Reward.named({})
+SCENE = make.scene_on(make.open_grid(26, 14), [1, 6], [24, 7], [[1.3, 0.7]])
+ALONE = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4])
+
+
+@pytest.fixture(scope="module")
+def many():
+    return evidence_of(make.drawn(SCENE, TRUTH, 400, seed=1))
+
+
+def test_a_known_reward_is_found_again_within_its_standard_errors(many):
+    found = fit(many, START, l2=0.0)
+    assert found.status is Status.CONVERGED
+    error = found.standard_errors
+    assert (error < [1.0, 0.3, 0.5, 0.5]).all(), "so many paths say it well"
+    assert (np.abs(np.array(found.reward.theta) - TRUTH.theta) < 3 * error).all()
+    assert found.identified.all()
+    assert not found.on_bound.any()
+    assert np.abs(likelihood(many, found.reward).gradient * error).max() < 1e-3
+    assert log_likelihood(many, TRUTH) < found.log_likelihood < log_likelihood(many, TRUTH) + 15
+    assert found.log_likelihood == pytest.approx(log_likelihood(many, found.reward), rel=1e-12)
+    assert found.log_likelihood_initial == pytest.approx(log_likelihood(many, START), rel=1e-12)
+    assert found.log_likelihood_uniform == pytest.approx(many.uniform_log_likelihood())
+    assert (found.demonstrations, found.steps) == (400, many.steps)
+    information = np.linalg.inv(-likelihood(many, found.reward).hessian)
+    assert found.covariance == pytest.approx(information, rel=1e-6)
+
+
+def test_the_answer_does_not_depend_on_the_start(many):
+    thetas = [
+        fit(many, Reward(theta), l2=0.0).reward.theta
+        for theta in ((-50.0, -0.01, -5.0, 2.0), (-90.0, -5.0, 2.0, 0.2), (-40.0, 0.0, -20.0, 9.0))
+    ]
+    assert thetas[1] == pytest.approx(thetas[0], rel=1e-3)
+    assert thetas[2] == pytest.approx(thetas[0], rel=1e-3)
+
+
+def test_from_an_indifferent_start_the_personal_space_is_learnt(many):
+    # At a_p = 0 neither slope nor own curvature tells sigma_p, only the mixed one.
+    found = fit(many, Reward((-50.0, -0.01, 0.0, 2.0)), l2=0.0)
+    assert found.identified.all()
+    assert found.reward.theta == pytest.approx(fit(many, START, l2=0.0).reward.theta, rel=1e-3)
+
+
+def test_the_way_up_is_recorded(many):
+    told = []
+    found = fit(many, START, l2=0.01, progress=lambda step, value: told.append((step, value)))
+    assert [step for step, _ in told] == list(range(1, len(told) + 1))
+    assert len(found.path_theta) == len(found.path_log_likelihood) == found.iterations + 1
+    assert tuple(found.path_theta[-1]) == pytest.approx(found.reward.theta)
+    assert found.path_log_likelihood[-1] == pytest.approx(found.log_likelihood)
+    assert found.evaluations >= len(told)
+
+
+def test_the_regulariser_pulls_toward_zero_in_its_scales(many):
+    free, held = fit(many, START, l2=0.0), fit(many, START, l2=2.0)
+    scale = np.array([10.0, 1.0, 1.0, 1.0])
+    assert np.linalg.norm(np.array(held.reward.theta) / scale) < np.linalg.norm(np.array(free.reward.theta) / scale)
+    # At its maximum the likelihood's gradient balances the pull.
+    gradient = likelihood(many, held.reward).gradient * scale
+    assert gradient == pytest.approx(2.0 * np.array(held.reward.theta) / scale, rel=1e-3, abs=1e-3)
+    assert held.log_likelihood < free.log_likelihood
+
+
+@pytest.mark.parametrize("l2", [0.0, 1e-3, 1.0])
+@pytest.mark.parametrize("person", [make.NOBODY, [[60.0, 60.0]]], ids=["nobody", "far away"])
+def test_without_a_person_near_the_personal_space_stays_where_it_was(l2, person):
+    scene = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4], person)
+    evidence = evidence_of(make.drawn(scene, Reward((-35.0, -0.6, 0.0, 1.0)), 30, seed=3))
+    found = fit(evidence, START, l2=l2)
+    assert found.status is Status.NOT_IDENTIFIED
+    assert found.identified.tolist() == [True, True, False, False]
+    assert found.reward.theta[2:] == (START.theta[2], START.theta[3])
+    assert np.isfinite(found.covariance[:2, :2]).all()
+    assert np.isnan(found.covariance[2:]).all()
+    assert np.isnan(found.standard_errors[2:]).all()
+
+
+def test_a_parameter_on_its_bound_is_said_and_has_no_standard_error():
+    # Paths along both borders of a field: leaving the nominal path pays, but a_g cannot be positive.
+    grid = make.open_grid(16, 9)
+    rim = [[0, 4], [1, 5], [2, 6], [3, 7], *[[c, 8] for c in range(4, 12)], [12, 7], [13, 6], [14, 5], [15, 4]]
+    mirror = [[c, 8 - r] for c, r in rim]
+    evidence = evidence_of([make.demonstration(grid, rim), make.demonstration(grid, mirror, number=2)] * 5)
+    found = fit(evidence, Reward((-50.0, -0.5, 0.0, 2.0)), l2=0.0)
+    assert found.reward.theta[1] == 0.0
+    assert found.on_bound.tolist() == [False, True, False, False]
+    assert likelihood(evidence, found.reward).gradient[1] > 0
+    assert np.isnan(found.standard_errors[1])
+    assert np.isfinite(found.standard_errors[0])
+    # Nobody is there either, which is said first; with a reward of way and deviation alone it is the bound.
+    assert found.status is Status.NOT_IDENTIFIED
+    alone = fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), l2=0.0)
+    assert alone.status is Status.ON_BOUND
+    assert alone.reward.theta == pytest.approx(found.reward.theta[:2], rel=1e-6)
+
+
+def test_a_path_that_is_always_shortest_has_no_best_cost_of_way():
+    # On a corridor of one cell the straight way is the likelier the more way costs, without end, and nothing lies
+    # beside the nominal path.
+    grid = make.open_grid(12, 1)
+    evidence = evidence_of([make.demonstration(grid, [[c, 0] for c in range(12)])])
+    found = fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), l2=0.0)
+    assert found.status is Status.NOT_IDENTIFIED
+    assert not found.identified.any()
+    assert found.reward.theta[0] < -50.0
+    assert found.reward.theta[1] == -0.5
+    assert np.isnan(found.standard_errors).all()
+    held = fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), l2=1e-3)
+    assert -50.0 < held.reward.theta[0] < -10.0, "with a regulariser it is the regulariser's"
+    assert held.reward.theta[1] == -0.5
+
+
+@pytest.mark.parametrize("l2", [-1.0, -1e-12, np.nan])
+def test_a_regulariser_below_zero_is_refused(many, l2):
+    with pytest.raises(RewardError, match="regulariser must not be negative, found --l2"):
+        fit(many, START, l2=l2)
+
+
+def test_a_start_without_a_partition_function_is_refused(many):
+    with pytest.raises(InfinitePartitionError, match="choose a more negative c0"):
+        fit(many, Reward((-10.0, 0.0, 0.0, 1.0)))
+
+
+def test_every_status_says_what_to_do():
+    assert {status.value for status in Status} == {"converged", "stopped early", "on bound", "not identified"}
+    assert len({status.advice for status in Status}) == 4
+
+
+def test_the_same_evidence_gives_the_same_fit(many):
+    one, two = fit(many, START), fit(many, START)
+    assert one.reward == two.reward
+    assert (one.covariance == two.covariance).all()
