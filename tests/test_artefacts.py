@@ -1,0 +1,192 @@
+"""What navirl writes, it reads back; what breaks a schema is refused with the place."""
+
+import json
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+from robot_log import Run, write_run
+
+from navirl_cli.artefacts import (
+    Input,
+    demonstrations_document,
+    read_demonstrations,
+    read_json,
+    read_reward,
+    read_reward_for,
+    reward_document,
+    schema_path,
+    write_json,
+)
+from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.errors import ArtefactError
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.likelihood import evidence_of
+from navirl_cli.irl.reward import Reward
+from navirl_cli.logs.load import load_recording
+
+
+@pytest.fixture(scope="module")
+def demonstration(tmp_path_factory):
+    path = write_run(tmp_path_factory.mktemp("log") / "run.mcap", Run(obstacles=((30, 17), (5, 5))))
+    return extract(load_recording(path), ExtractSettings()).demonstrations[0]
+
+
+@pytest.fixture
+def demos(tmp_path, demonstration):
+    path = tmp_path / "demos.json"
+    two = [demonstration, replace(demonstration, id="run/2", force_n=None, cycle=2, people_m=np.zeros((0, 2)))]
+    write_json(path, "demonstrations", demonstrations_document(two, [Input("run.mcap", "0" * 64)], {}), force=False)
+    return path, two
+
+
+def edited(path: Path, change) -> Path:
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["demonstrations", "reward", "metrics"])
+def test_schemas_are_schemas(kind):
+    Draft202012Validator.check_schema(json.loads(schema_path(kind).read_text()))
+
+
+def test_demonstrations_come_back_as_they_were(demos):
+    path, written = demos
+    for d, back in zip(written, read_demonstrations(path), strict=True):
+        for field in fields(d):
+            old, new = getattr(d, field.name), getattr(back, field.name)
+            if field.name == "grid":
+                assert new.digest == old.digest
+            elif field.name == "contacts":
+                assert [c.impulse_ns for c in new] == [pytest.approx(c.impulse_ns, abs=1e-6) for c in old]
+            elif isinstance(old, np.ndarray):
+                assert new == pytest.approx(old, abs=1e-6)
+            else:
+                assert new == old
+
+
+def test_a_reward_comes_back_with_its_covariance(tmp_path, demonstration):
+    result = fit(evidence_of([demonstration]), Reward.named({}))
+    path = tmp_path / "reward.json"
+    write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
+    back = read_reward(path)
+    assert back.reward == result.reward
+    assert back.covariance == pytest.approx(result.covariance, nan_ok=True)
+    assert (back.resolution_m, back.demonstrations) == (0.1, ("run/1",))
+    document = read_json(path, "reward")
+    assert document["initial"] == {"c0": -50.0, "a_g": -0.01, "a_p": -5.0, "sigma_p": 2.0}
+    coarse = extract_coarse(demonstration)
+    with pytest.raises(ArtefactError, match=r"learnt on cells of 0\.1 m, but .* cells of 0\.2 m; extract .* --resol"):
+        read_reward_for(path, [coarse])
+
+
+def extract_coarse(demonstration):
+    return replace(
+        demonstration,
+        grid=demonstration.grid.resampled(0.2).freed(np.array([[1, 1], [2, 1]])),
+        cells=np.array([[1, 1], [2, 1]]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.pop("maps"), "at the whole file: 'maps' is a required property"),
+        (lambda d: d.update(version=2), "at version: 1 was expected"),
+        (lambda d: d.update(extra=1), r"at the whole file: Additional properties are not allowed \('extra' was"),
+        (lambda d: d["demonstrations"][0].update(condition="push"), "at demonstrations/0/condition: 'push' is not one"),
+        (lambda d: d["demonstrations"][1].update(goal_m=[1]), r"at demonstrations/1/goal_m: \[1\] is too short"),
+        (lambda d: d["demonstrations"][0].update(map="x"), "demonstration run/1: its map 'x' is not in the file"),
+        (lambda d: d["demonstrations"][0]["x_m"].pop(), "demonstration run/1: all input arrays must have the same"),
+        (lambda d: d["demonstrations"][0]["yaw_rad"].pop(), r"demonstration run/1: yaw_rad needs the shape"),
+        (lambda d: d["demonstrations"][0]["t_s"].reverse(), "demonstration run/1: needs at least two poses at incr"),
+        (lambda d: d["demonstrations"][0]["x_m"].__setitem__(3, "a"), "demonstration run/1: could not convert"),
+        (lambda d: d["demonstrations"][0]["x_m"].__setitem__(3, None), "demonstration run/1: xy_m holds values that"),
+        (lambda d: d["demonstrations"][0]["cells"].pop(3), "demonstration run/1: step 2 of its path does not lead"),
+        (lambda d: next(iter(d["maps"].values()))["rows"].append("#"), "a map's rows differ in length"),
+        (lambda d: next(iter(d["maps"].values())).update(resolution_m=-1), "resolution_m: -1 is less than or equal"),
+    ],
+)
+def test_broken_demonstrations_are_refused_with_the_place(demos, change, message):
+    path, _ = demos
+    with pytest.raises(ArtefactError, match=message) as caught:
+        read_demonstrations(edited(path, change))
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_path_through_an_occupied_cell_is_refused(demos):
+    path, _ = demos
+
+    def block(document):
+        first = document["demonstrations"][0]
+        column, row = first["cells"][10]
+        rows = document["maps"][first["map"]]["rows"]
+        rows[row] = rows[row][:column] + "#" + rows[row][column + 1 :]
+
+    with pytest.raises(ArtefactError, match="demonstration run/1: its path crosses occupied cells"):
+        read_demonstrations(edited(path, block))
+
+
+def test_what_is_no_demonstrations_file_is_named(tmp_path):
+    for content, message in (
+        ("", "expected a JSON file of navirl demonstrations, found none"),
+        ("[]", "expected navirl demonstrations (format 'navirl/demonstrations'), found other JSON"),
+        ('{"format": "navirl/reward"}', "found a file of format 'navirl/reward'"),
+    ):
+        path = tmp_path / "x.json"
+        path.write_text(content)
+        with pytest.raises(ArtefactError, match=re.escape(message)):
+            read_demonstrations(path)
+    log = tmp_path / "run.mcap"
+    log.write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(
+        ArtefactError, match=r"run\.mcap: expected a JSON file .*logs become demonstrations by navirl extract"
+    ):
+        read_demonstrations(log)
+    with pytest.raises(ArtefactError, match=r"none\.json: cannot be read: No such file"):
+        read_demonstrations(tmp_path / "none.json")
+
+
+def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
+    path = tmp_path / "reward.json"
+    result = fit(evidence_of([demonstration]), Reward.named({}))
+    write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
+    edited(path, lambda d: d["parameters"][0].update(name="c9"))
+    with pytest.raises(ArtefactError, match="unknown parameter c9; the reward has c0, a_g, a_p, sigma_p"):
+        read_reward(path)
+    edited(path, lambda d: d["parameters"][0].update(name="c0", value=5.0))
+    with pytest.raises(ArtefactError, match="c0 = 5 1/m is outside its bounds"):
+        read_reward(path)
+    edited(path, lambda d: (d["parameters"][0].update(value=-50.0), d["covariance"].pop()))
+    with pytest.raises(ArtefactError, match="covariance: expected 4 rows and columns"):
+        read_reward(path)
+
+
+def test_files_appear_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "x.json"
+    write_json(path, "metrics", {"a": 1}, force=False)
+    old = path.read_text()
+    with pytest.raises(ArtefactError, match=r"x\.json: exists already; give another name, or --force"):
+        write_json(path, "metrics", {"a": 2}, force=False)
+    with pytest.raises(ValueError, match="Out of range float"):
+        write_json(path, "metrics", {"a": float("nan")}, force=True)
+    assert path.read_text() == old
+    assert [item.name for item in tmp_path.iterdir()] == ["x.json"]
+    with pytest.raises(ArtefactError, match="expected an existing folder, found none"):
+        write_json(tmp_path / "no" / "x.json", "metrics", {}, force=False)
+    with pytest.raises(ArtefactError, match="found a folder; name a file in it"):
+        write_json(tmp_path, "metrics", {}, force=True)
+
+
+def test_inputs_are_hashed(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"abc")
+    assert Input.of(path).sha256.startswith("ba7816bf8f01cfea")
+    with pytest.raises(ArtefactError, match="cannot be read"):
+        Input.of(tmp_path / "b")
