@@ -1,0 +1,1 @@
+"""How paths differ: metrics of demonstrated, learnt and baseline paths."""
