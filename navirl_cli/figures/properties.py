@@ -1,0 +1,121 @@
+"""Properties of paths by group as bars (Fig. 7)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.container import BarContainer
+from matplotlib.ticker import MaxNLocator
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.metrics import METRICS, Metric, PathMetrics
+from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
+
+#: Share of a figure's width that the bars' labels may take, and the mean width of one of their letters, inches.
+_LABELLED, _LETTER_IN = 0.3, 0.062
+#: Height of a line of text and of the space between two bars, inches.
+_LINE_IN, _BETWEEN_IN = 0.125, 0.06
+#: Height of what stands below the bars, inches; panels narrower than this have few ticks and labels in short lines.
+_BELOW_IN, _NARROW_IN, _SHORT = 0.45, 1.8, 10
+_WHISKER: dict[str, Any] = {"ecolor": INK, "elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8}
+
+
+@dataclass(frozen=True)
+class PropertyBar:
+    """One bar of every panel: the paths of one group, or of one kind."""
+
+    label: str
+    #: Key of its colour, as :func:`navirl_cli.figures.style.colour_of` takes it.
+    key: str
+    mean: PathMetrics
+    #: Standard deviations; NaN where one path has none.
+    std: PathMetrics
+    #: Number of paths.
+    count: int
+
+
+@dataclass(frozen=True)
+class DrawnProperties:
+    """What :func:`draw_properties` put on the axes, by panel."""
+
+    axes: list[Axes]
+    bars: list[BarContainer]
+
+
+def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
+    """Height of a figure of these bars in which no two labels touch, inches.
+
+    Args:
+        bars: The bars.
+        width_in: Width of the figure, inches.
+    """
+    most = max((_label(bar, width_in).count("\n") + 1 for bar in bars), default=1)
+    below = _BELOW_IN + (2 * _LINE_IN if width_in / len(METRICS) < _NARROW_IN else 0.0)
+    return below + len(bars) * (most * _LINE_IN + _BETWEEN_IN)
+
+
+@house_style()
+def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnProperties:
+    """Draw mean and standard deviation of every metric, a panel each; bars lie, so that long labels stay readable.
+
+    Bars start at 0. A mean that does not exist (the distance to people where there is nobody) is said to be missing.
+
+    Args:
+        axes: One for each of METRICS, side by side, :func:`height_for` inches high with their labels. The first names
+            the bars and their numbers of paths.
+        bars: From top to bottom.
+
+    Returns:
+        The artists.
+
+    Raises:
+        DemonstrationError: There is no bar.
+    """
+    if not bars:
+        raise DemonstrationError("no paths to compare: check --condition, --cycle and --only-corrected")
+    drawn = [_draw_panel(panel, metric, bars) for panel, metric in zip(axes, METRICS, strict=True)]
+    width_in = panel_width_in(axes[0]) * len(axes)
+    axes[0].set_yticks(range(len(bars)), [_label(bar, width_in) for bar in bars])
+    return DrawnProperties(list(axes), drawn)
+
+
+def _label(bar: PropertyBar, width_in: float) -> str:
+    """A bar's name and number of paths, in lines that leave the panels their share of the figure's width."""
+    count = f"(n\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}{bar.count})"
+    letters = int(_LABELLED * width_in / _LETTER_IN)
+    return fill(f"{bar.label} {count}", letters, break_long_words=False, break_on_hyphens=False)
+
+
+def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarContainer:
+    """One metric."""
+    at = np.arange(len(bars))
+    mean = np.array([getattr(bar.mean, metric.name) for bar in bars], dtype=float)
+    std = np.array([getattr(bar.std, metric.name) for bar in bars], dtype=float)
+    colours = [colour_of(bar.key) for bar in bars]
+    drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=INK, linewidth=0.5, error_kw=_WHISKER)
+    for y in at[np.isnan(mean)]:
+        axes.annotate("none", (0.0, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
+    narrow = panel_width_in(axes) < _NARROW_IN
+    label = f"{metric.label} [{metric.unit}]"
+    axes.set_xlabel(fill(label, _SHORT) if narrow else label)
+    axes.set_ylim(len(bars) - 0.4, -0.6)
+    axes.set_xlim(_limits(mean, std))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=2 if narrow else 4, steps=[1, 2, 2.5, 5, 10]))
+    axes.axvline(0.0, color=INK, linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    axes.set_yticks(at, [""] * len(bars))
+    return drawn
+
+
+def _limits(mean: FloatArray, std: FloatArray) -> tuple[float, float]:
+    """Borders of the metric's axis: from 0, or from below the lowest whisker, to a little above the highest."""
+    spread = np.nan_to_num(std)
+    ends = np.concatenate([[0.0], (mean - spread)[~np.isnan(mean)], (mean + spread)[~np.isnan(mean)]])
+    low, high = float(ends.min()), float(ends.max())
+    room = 0.06 * (high - low) or 1.0
+    return (low - room if low < 0 else 0.0), high + room

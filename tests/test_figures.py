@@ -1,0 +1,209 @@
+"""What figures of a map draw: paths, obstacles, people, and the part of the map that is worth its paper."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
+from navirl_cli.demos.grid import Grid
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.figures.ground import window_around
+from navirl_cli.figures.paths import draw_paths
+from navirl_cli.figures.sheet import new_figure
+from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
+
+
+def room(rows=40, columns=80, origin_m=(-4.0, -2.0)):
+    occupied = np.zeros((rows, columns), dtype=bool)
+    occupied[:4] = occupied[-4:] = True
+    occupied[:, :4] = occupied[:, -4:] = True
+    return Grid(occupied, 0.1, origin_m)
+
+
+def demonstration(condition=Condition.FORCE, cycle=None, aside_m=0.5, contacts=(), grid=None, people_m=((0.0, 0.1),)):
+    """A path from (-3, 0) to (3, 0) along an arc, at 0.6 m/s."""
+    t = np.linspace(0.0, 10.0, 101)
+    x = -3.0 + 0.6 * t
+    xy = np.stack([x, 0.05 + aside_m * np.cos(x * np.pi / 6)], axis=1)
+    grid = room() if grid is None else grid
+    columns = np.arange(10, 70)
+    cells = np.stack([columns, np.full(60, 20)], axis=1)
+    return Demonstration(
+        id=f"{condition}-{cycle}-{aside_m}",
+        participant="p01",
+        condition=condition,
+        corrected=True,
+        cycle=cycle,
+        start_ns=0,
+        t_s=t,
+        xy_m=xy,
+        yaw_rad=np.zeros(101),
+        force_n=None,
+        contacts=tuple(Contact(start, end, 9.0, (0.0, 3.0)) for start, end in contacts),
+        goal_m=(3.0, 0.05),
+        people_m=np.array(people_m, dtype=float).reshape(-1, 2),
+        robot_radius_m=0.3,
+        grid=grid,
+        cells=cells,
+    )
+
+
+def one_axes(width_in=COLUMN_IN):
+    return new_figure(width_in)[1][0]
+
+
+def legend_texts(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def labelled(axes, label):
+    (line,) = [line for line in axes.lines if line.get_label() == label]
+    return line
+
+
+def test_every_path_is_drawn_where_it_was_driven_in_the_colour_of_its_group():
+    ones = [
+        demonstration(Condition.AUTONOMOUS, aside_m=0.0),
+        demonstration(Condition.FORCE, 2, 0.4),
+        demonstration(Condition.JOYSTICK, aside_m=-0.5),
+        demonstration(Condition.FORCE, 1, 0.6),
+    ]
+    drawn = draw_paths(one_axes(), ones)
+    for line, one in zip(drawn.lines, [ones[3], ones[1], ones[2], ones[0]], strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), one.xy_m)
+    assert [line.get_color() for line in drawn.lines] == ["#56B4E9", "#0072B2", "#D55E00", "#009E73"]
+
+
+def test_the_legend_names_groups_with_their_counts_and_what_the_marks_mean():
+    ones = [
+        demonstration(Condition.FORCE, 1),
+        demonstration(Condition.FORCE, 1, 0.3),
+        demonstration(Condition.JOYSTICK),
+    ]
+    drawn = draw_paths(one_axes(), ones)
+    assert legend_texts(drawn.axes) == [
+        "force, cycle 1 (n = 2)",
+        "joystick (n = 1)",
+        "start",
+        "goal",
+        "robot",
+        "person",
+        "obstacle, inflated",
+    ]
+    handles = drawn.axes.get_legend().legend_handles
+    assert [handle.get_color() for handle in handles[:2]] == [COLOURS["force, cycle 1"], COLOURS["joystick"]]
+
+
+def test_the_legend_can_be_left_out():
+    assert draw_paths(one_axes(), [demonstration()], legend=False).axes.get_legend() is None
+
+
+def test_a_legend_is_as_wide_as_its_panel_at_most():
+    ones = [demonstration(condition, 12) for condition in Condition]
+    for panels, width_in in ((1, COLUMN_IN), (1, PAGE_IN), (3, PAGE_IN)):
+        figure, axes = new_figure(width_in, panels=panels)
+        draw_paths(axes[0], ones)
+        figure.draw_without_rendering()
+        legend = axes[0].get_legend().get_window_extent()
+        assert legend.width / figure.dpi <= width_in / panels
+        assert legend.y1 < axes[0].xaxis.label.get_window_extent().y0
+
+
+def test_contact_is_drawn_thicker_on_the_stretch_it_lasted():
+    drawn = draw_paths(one_axes(), [demonstration(contacts=[(2.05, 4.0), (9.0, 20.0)])])
+    first, second = drawn.contacts
+    np.testing.assert_allclose(first.get_xdata()[[0, -1]], [-3.0 + 0.6 * 2.05, -3.0 + 0.6 * 4.0])
+    assert len(first.get_xdata()) == 2 + 19  # poses at 2.1 .. 3.9 s between the two ends
+    np.testing.assert_allclose(second.get_xdata()[[0, -1]], [2.4, 3.0])
+    assert first.get_linewidth() > 2 * drawn.lines[0].get_linewidth()
+    assert first.get_color() == drawn.lines[0].get_color()
+    assert "in contact" in legend_texts(drawn.axes)
+
+
+def test_obstacles_lie_where_the_map_has_them_and_free_cells_stay_white():
+    grid = room()
+    drawn = draw_paths(one_axes(), [demonstration(grid=grid)])
+    (image,) = drawn.obstacles
+    assert tuple(image.get_extent()) == grid.extent_m
+    assert image.origin == "lower"
+    np.testing.assert_array_equal(image.get_array().mask, ~grid.occupied)
+    assert to_hex(image.to_rgba(image.get_array())[0, 0]) == "#d4d4d4"
+    assert image.to_rgba(image.get_array())[20, 20, 3] == 0.0
+
+
+def test_what_one_path_drove_through_is_free_on_the_shared_map():
+    grid = room()
+    freed = grid.freed(np.array([[50, 2]]))
+    drawn = draw_paths(one_axes(), [demonstration(grid=grid), demonstration(grid=freed)])
+    (image,) = drawn.obstacles
+    np.testing.assert_array_equal(image.get_array().mask, ~freed.occupied)
+
+
+def test_maps_of_different_places_are_all_drawn():
+    shifted = room(origin_m=(-4.0, -1.8))
+    drawn = draw_paths(one_axes(), [demonstration(), demonstration(grid=shifted)])
+    assert [tuple(image.get_extent()) for image in drawn.obstacles] == [room().extent_m, shifted.extent_m]
+    np.testing.assert_allclose(drawn.axes.get_ylim(), (-2.0, 2.2))
+
+
+def test_people_and_robot_are_drawn_to_scale_once():
+    ones = [
+        demonstration(aside_m=0.5, people_m=[(0.0, 0.1)]),
+        demonstration(aside_m=0.3, people_m=[(0.001, 0.1), (1.0, -1.0)]),
+    ]
+    drawn = draw_paths(one_axes(), ones)
+    assert [circle.center for circle in drawn.people] == [(0.0, 0.1), (1.0, -1.0)]
+    assert {circle.radius for circle in drawn.people} == {0.25}
+    (robot,) = drawn.robots
+    np.testing.assert_allclose(robot.center, ones[0].xy_m[0])
+    assert robot.radius == 0.3
+
+
+def test_starts_apart_have_an_outline_each():
+    shifted = Demonstration(**{**vars(demonstration()), "xy_m": demonstration().xy_m + np.array([0.0, 0.4])})
+    drawn = draw_paths(one_axes(), [demonstration(), shifted])
+    assert len(drawn.robots) == 2
+    np.testing.assert_allclose(labelled(drawn.axes, "start").get_ydata(), [0.05, 0.45])
+    np.testing.assert_allclose(labelled(drawn.axes, "goal").get_xydata(), [(3.0, 0.05)])
+
+
+def test_nobody_is_not_in_the_legend():
+    drawn = draw_paths(one_axes(), [demonstration(people_m=[])])
+    assert drawn.people == []
+    assert "person" not in legend_texts(drawn.axes)
+
+
+def test_no_demonstration_is_refused():
+    with pytest.raises(DemonstrationError, match="no demonstration to draw: check --condition"):
+        draw_paths(one_axes(), [])
+
+
+def test_axes_are_metres_to_the_same_scale():
+    axes = draw_paths(one_axes(), [demonstration()], title="all trials").axes
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("x [m]", "y [m]", "all trials")
+    assert axes.get_aspect() == 1.0
+    np.testing.assert_allclose((*axes.get_xlim(), *axes.get_ylim()), room().extent_m)
+
+
+def test_a_large_map_is_cropped_to_the_paths_and_a_margin():
+    points = np.array([(-1.0, 0.0), (2.0, 0.5)])
+    assert window_around([room(300, 300, (-15.0, -15.0))], points) == pytest.approx((-2.5, 3.5, -1.5, 2.0))
+
+
+def test_a_crop_ends_where_the_map_ends():
+    points = np.array([(-14.5, 0.0), (2.0, 0.5)])
+    assert window_around([room(300, 300, (-15.0, -15.0))], points)[0] == pytest.approx(-15.0)
+
+
+def test_a_map_of_the_paths_size_is_shown_whole():
+    points = np.array([(-3.0, 0.0), (3.0, 0.5)])
+    assert window_around([room()], points) == pytest.approx(room().extent_m)
+
+
+def test_points_beyond_the_map_are_shown():
+    assert window_around([room()], np.array([(-3.0, 0.0), (6.0, 0.0)]))[1] == pytest.approx(6.0)
+
+
+def test_a_window_can_be_given():
+    axes = draw_paths(one_axes(), [demonstration()], window_m=(-1.0, 1.0, -2.0, 2.0)).axes
+    assert (*axes.get_xlim(), *axes.get_ylim()) == (-1.0, 1.0, -2.0, 2.0)

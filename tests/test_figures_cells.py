@@ -1,0 +1,137 @@
+"""What figures of numbers by cell draw: the propagated policy and the state reward."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+from test_figures import demonstration, labelled, legend_texts, one_axes
+
+from navirl_cli.figures.cells import LEAST_VISITS, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.sheet import new_figure
+from navirl_cli.figures.style import PAGE_IN
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene, scenes_of
+
+PUBLISHED = Reward((-54.1, -0.87, -4.9, 1.68))
+
+
+def scene(people_m=((0.0, 0.1),)) -> Scene:
+    return scenes_of([demonstration(people_m=people_m)])[0]
+
+
+@cache
+def scene_and_visits():
+    a_scene = scene()
+    return a_scene, visits_in(a_scene)
+
+
+def visits_in(a_scene):
+    start = np.zeros(a_scene.lattice.size)
+    start[a_scene.start] = 1.0
+    return policy_of(PUBLISHED, a_scene).visits(start)
+
+
+def assert_cells(drawn: DrawnCells, a_scene: Scene, values) -> None:
+    grid = a_scene.lattice.grid
+    image = drawn.image
+    assert tuple(image.get_extent()) == grid.extent_m
+    assert image.origin == "lower"
+    np.testing.assert_array_equal(image.get_array().mask, grid.occupied)
+    columns, rows = a_scene.lattice.cells.T
+    np.testing.assert_array_equal(image.get_array()[rows, columns], values)
+    np.testing.assert_array_equal(drawn.obstacles.get_array().mask, ~grid.occupied)
+    assert image.get_zorder() < drawn.obstacles.get_zorder() < drawn.nominal.get_zorder()
+    np.testing.assert_array_equal(drawn.nominal.get_xydata(), a_scene.nominal_line_m())
+    np.testing.assert_allclose(labelled(drawn.axes, "start").get_xydata(), a_scene.lattice.xy_m[[a_scene.start]])
+    np.testing.assert_allclose(labelled(drawn.axes, "goal").get_xydata(), a_scene.lattice.xy_m[[a_scene.goal]])
+    assert [circle.center for circle in drawn.people] == [tuple(person) for person in a_scene.people_m]
+    assert (drawn.axes.get_xlabel(), drawn.axes.get_ylabel()) == ("x [m]", "y [m]")
+
+
+def test_the_policy_is_drawn_as_visits_on_a_logarithmic_scale():
+    a_scene, visits = scene_and_visits()
+    drawn = draw_policy(one_axes(), a_scene, visits, robot_radius_m=0.3)
+    assert_cells(drawn, a_scene, visits)
+    norm = drawn.image.norm
+    assert (norm.vmin, norm.vmax) == (LEAST_VISITS, visits.max())
+    assert norm(np.sqrt(LEAST_VISITS)) == pytest.approx(0.5, rel=1e-3)
+    assert drawn.colour_bar.ax.get_ylabel() == "expected visits"
+    assert legend_texts(drawn.axes) == ["nominal path", "start", "goal", "robot", "person", "obstacle, inflated"]
+
+
+def test_the_bar_of_visits_is_numbered_in_plain_decades():
+    drawn = draw_policy(one_axes(), *scene_and_visits())
+    drawn.axes.figure.draw_without_rendering()
+    labels = [label.get_text() for label in drawn.colour_bar.ax.get_yticklabels()]
+    assert [label for label in labels if label in {"0.001", "0.01", "0.1", "1"}] == ["0.001", "0.01", "0.1", "1"]
+
+
+def test_unlikely_cells_are_white_and_likely_ones_dark():
+    image = draw_policy(one_axes(), *scene_and_visits()).image
+    rarely, never, often = (image.to_rgba(np.ma.array([value]))[0] for value in (1e-5, 0.0, 0.5))
+    assert tuple(rarely) == to_rgba("white")
+    assert never[3] == 0.0  # the paper shows
+    assert often[:3].sum() < 1.0
+
+
+def test_cells_visited_more_than_once_widen_the_scale():
+    visits = np.full(scene().lattice.size, 2.5)
+    assert draw_policy(one_axes(), scene(), visits).image.norm.vmax == 2.5
+
+
+def test_the_reward_is_drawn_by_cell_on_a_linear_scale():
+    a_scene = scene()
+    reward = PUBLISHED.by_cell(a_scene)
+    drawn = draw_reward(one_axes(), a_scene, reward)
+    assert_cells(drawn, a_scene, reward)
+    assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == (reward.min(), reward.max())
+    assert drawn.colour_bar.ax.get_ylabel() == "state reward per step"
+    assert "robot" not in legend_texts(drawn.axes)
+
+
+def test_the_reward_scale_spans_what_is_shown():
+    a_scene = scene()
+    x = a_scene.lattice.xy_m[:, 0]
+    drawn = draw_reward(one_axes(), a_scene, x, window_m=(-1.0, 1.0, -2.0, 2.0))
+    assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == pytest.approx((-0.95, 0.95))
+
+
+def test_a_reward_that_is_the_same_everywhere_can_be_drawn():
+    drawn = draw_reward(one_axes(), scene(people_m=[]), np.zeros(scene().lattice.size))
+    drawn.axes.figure.draw_without_rendering()
+    assert drawn.people == []
+
+
+def test_a_colour_bar_is_as_high_as_its_map():
+    drawn = draw_reward(one_axes(), scene(), PUBLISHED.by_cell(scene()))
+    drawn.axes.figure.draw_without_rendering()
+    of_map, of_bar = drawn.axes.get_window_extent(), drawn.colour_bar.ax.get_window_extent()
+    assert (of_bar.y0, of_bar.y1) == pytest.approx((of_map.y0, of_map.y1), abs=0.5)
+    assert of_bar.x0 > of_map.x1
+
+
+def test_a_flat_map_has_its_colour_bar_above_under_the_title():
+    window = (-3.5, 3.5, -1.0, 1.0)
+    drawn = draw_policy(one_axes(), *scene_and_visits(), window_m=window, title="policy")
+    figure = drawn.axes.figure
+    figure.draw_without_rendering()
+    of_map, of_label = drawn.axes.get_window_extent(), drawn.colour_bar.ax.xaxis.label.get_window_extent()
+    assert drawn.colour_bar.ax.get_xlabel() == "expected visits"
+    assert of_map.y1 < of_label.y0 < of_label.y1 < drawn.axes.title.get_window_extent().y0
+    assert drawn.axes.title.get_window_extent().y1 <= figure.bbox.y1
+
+
+def test_two_figures_of_a_scene_can_show_the_same_window():
+    a_scene, visits = scene_and_visits()
+    _, (left, right) = new_figure(PAGE_IN, panels=2)
+    policy = draw_policy(left, a_scene, visits)
+    reward = draw_reward(right, a_scene, PUBLISHED.by_cell(a_scene), window_m=policy.window_m)
+    assert (*right.get_xlim(), *right.get_ylim()) == policy.window_m == reward.window_m
+
+
+@pytest.mark.parametrize("draw", [draw_policy, draw_reward])
+def test_numbers_that_are_not_one_a_state_are_refused(draw):
+    with pytest.raises(ValueError, match=r"one number for each of \d+ states is needed, found shape \(3,\)"):
+        draw(one_axes(), scene(), np.zeros(3))

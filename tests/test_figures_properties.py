@@ -1,0 +1,114 @@
+"""What the figure of path properties draws, and that no two of its labels touch; colours."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.metrics import METRICS, PathMetrics
+from navirl_cli.figures.properties import PropertyBar, draw_properties, height_for
+from navirl_cli.figures.sheet import new_figure
+from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of
+
+
+def bar(label="force, cycle 1", key="force, cycle 1", mean=(6.5, 0.5, 2.0), std=(0.1, 0.2, 0.5), count=12):
+    return PropertyBar(label, key, PathMetrics(*mean), PathMetrics(*std), count)
+
+
+def properties(bars, width_in=PAGE_IN):
+    figure, axes = new_figure(width_in, height_for(bars, width_in), panels=len(METRICS))
+    return figure, draw_properties(axes, bars)
+
+
+def whiskers(container):
+    (segments,) = [bar.get_segments() for bar in container.errorbar[2]]
+    return [tuple(segment[:, 0]) for segment in segments]
+
+
+def test_bars_are_means_from_zero_and_whiskers_standard_deviations():
+    bars = [bar(), bar("learnt", "learnt", (7.0, 0.4, 2.5), (0.3, 0.1, 0.25), 100)]
+    _, drawn = properties(bars)
+    for panel, means, stds in zip(
+        drawn.bars, [(6.5, 7.0), (0.5, 0.4), (2.0, 2.5)], [(0.1, 0.3), (0.2, 0.1), (0.5, 0.25)], strict=True
+    ):
+        assert [patch.get_width() for patch in panel.patches] == pytest.approx(means)
+        assert {patch.get_x() for patch in panel.patches} == {0.0}
+        expected = [(mean - std, mean + std) for mean, std in zip(means, stds, strict=True)]
+        np.testing.assert_allclose(whiskers(panel), expected)
+        assert [to_hex(patch.get_facecolor()) for patch in panel.patches] == ["#56b4e9", "#cc79a7"]
+    for axes in drawn.axes:
+        low, high = axes.get_xlim()
+        assert low == 0.0
+        assert high > max(end for panel in [drawn.bars[drawn.axes.index(axes)]] for _, end in whiskers(panel))
+
+
+def test_panels_name_metric_and_unit_and_rows_group_and_count():
+    _, drawn = properties([bar(), bar("joystick", "joystick", count=3)])
+    assert [axes.get_xlabel() for axes in drawn.axes] == [
+        "path length [m]",
+        "min. distance [m]",
+        "area under path [m²]",
+    ]
+    rows = [label.get_text().replace("\N{NO-BREAK SPACE}", " ") for label in drawn.axes[0].get_yticklabels()]
+    assert rows == ["force, cycle 1 (n = 12)", "joystick (n = 3)"]
+    assert {label.get_text() for axes in drawn.axes[1:] for label in axes.get_yticklabels()} == {""}
+    bottom, top = drawn.axes[0].get_ylim()
+    assert bottom > top  # the first row stands at the top
+
+
+def test_a_mean_that_does_not_exist_is_said_to_be_missing():
+    nan = float("nan")
+    figure, drawn = properties([bar(), bar("alone", "autonomous", (6.0, nan, 0.1), (nan, nan, nan), 1)])
+    figure.draw_without_rendering()
+    assert [[text.get_text() for text in axes.texts] for axes in drawn.axes] == [[], ["none"], []]
+    assert drawn.axes[1].texts[0].xy == (0.0, 1)
+    assert drawn.axes[1].get_xlim()[0] == 0.0
+
+
+def test_negative_distances_stay_on_the_paper():
+    _, drawn = properties([bar(mean=(6.0, -0.2, 1.0), std=(0.1, 0.1, 0.1))])
+    low, high = drawn.axes[1].get_xlim()
+    assert low < -0.3
+    assert high > 0.0
+
+
+@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
+@pytest.mark.parametrize("rows", [1, 20])
+def test_no_two_labels_touch(width_in, rows):
+    bars = [bar(f"force, cycle {n}: driven, on the grid of the map", count=10 * n) for n in range(rows)]
+    figure, drawn = properties(bars, width_in)
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in drawn.axes[0].get_yticklabels()]
+    assert all(upper.y0 > lower.y1 for upper, lower in pairwise(boxes))
+    labels = [axes.xaxis.label.get_window_extent() for axes in drawn.axes]
+    assert all(left.x1 < right.x0 for left, right in pairwise(labels))
+    paper = figure.bbox
+    assert all(box.x0 >= 0 and box.x1 <= paper.x1 and box.y0 >= 0 for box in [*boxes, *labels])
+    for axes in drawn.axes:
+        inside = [tick.label1.get_window_extent() for tick in axes.xaxis.get_major_ticks() if tick.get_visible()]
+        shown = [box for box in inside if box.width > 0]
+        assert all(left.x1 < right.x0 for left, right in pairwise(shown))
+
+
+def test_no_bar_is_refused():
+    with pytest.raises(DemonstrationError, match="no paths to compare"):
+        draw_properties(new_figure(panels=3)[1], [])
+
+
+@pytest.mark.parametrize(
+    ("key", "colour"),
+    [
+        ("force", "#0072B2"),
+        ("force, cycle 1", "#56B4E9"),
+        ("force, cycle 2", "#0072B2"),
+        ("force, cycle 7", "#00304D"),
+        ("joystick, cycle 2", "#D55E00"),
+        ("autonomous", "#009E73"),
+        ("driven, on grid", "#7A7A7A"),
+        ("of no kind", "#8C8C8C"),
+    ],
+)
+def test_a_group_has_one_colour(key, colour):
+    assert colour_of(key) == colour
