@@ -1,0 +1,150 @@
+"""One participant's session (Sec. IV-C): two cycles of pushing with a fit between, joystick, obstacle avoidance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.demos.rasterize import rasterize
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.likelihood import evidence_of
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene, avoidance_line_m
+from navirl_cli.simulation import person
+from navirl_cli.simulation.driving import STEP_S, Drive, Path, Steering, drive
+from navirl_cli.simulation.hallway import (
+    GOAL_X_M,
+    LANE_Y_M,
+    OFFSET_M,
+    PERSON_RADIUS_M,
+    ROBOT_RADIUS_M,
+    START_X_M,
+    Hallway,
+)
+
+#: Before its goal is announced, between announcement and start, and after its arrival the robot stands, s.
+STAND_BEFORE_S, STAND_ANNOUNCED_S, STAND_AFTER_S = 2.0, 0.5, 1.5
+BACK_M_S = 0.7
+#: Side of the hallway on which the robot is driven back, m from the nominal path.
+BACK_ASIDE_M = 1.3
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One trial as it truly was."""
+
+    condition: Condition
+    cycle: int | None
+    plan: Path
+    drive: Drive
+
+    @property
+    def steering(self) -> FloatArray:
+        """(n, 2) m/s that the person added."""
+        return self.drive.command_m_s
+
+
+@dataclass(frozen=True)
+class Session:
+    """All passes of a participant, and who they are."""
+
+    name: str
+    hallway: Hallway
+    #: What the participant truly wants.
+    truth: Reward
+    #: What the robot learnt after the first cycle.
+    learnt: Reward
+    passes: tuple[Pass, ...]
+
+
+def session(number: int, seed: int) -> Session:
+    """Simulate a participant's session.
+
+    Args:
+        number: Of the participant, from 1.
+        seed: Of the whole study; the same seed gives the same session.
+    """
+    rng = np.random.default_rng([seed, number])
+    hallway = Hallway.with_person(rng)
+    truth = person.personal_reward(rng)
+    first = [_pushed(hallway, truth, _nominal(), offset, 1, rng) for offset in _either_first(rng)]
+    demonstrations = [_as_demonstration(hallway, one, f"{number}/{i}") for i, one in enumerate(first)]
+    learnt = fit(evidence_of(demonstrations), Reward.named({})).reward
+    scene = _scene(hallway, 0.0)
+    second = [_pushed(hallway, truth, person.drawn_path(scene, learnt, rng), 0.0, 2, rng) for _ in range(2)]
+    joystick = [_steered(hallway, truth, rng) for _ in range(2)]
+    around = Path.along(avoidance_line_m(scene, ROBOT_RADIUS_M + PERSON_RADIUS_M), person.SMOOTHING_M / 2)
+    alone = Pass(Condition.AUTONOMOUS, None, around, drive(around, around.xy_m[0], person.no_hand))
+    return Session(f"p{number:02d}", hallway, truth, learnt, (*first, *second, *joystick, alone))
+
+
+def drive_back(from_m: FloatArray, to_m: FloatArray) -> Drive:
+    """The experimenter drives the robot back to a start, past the person at a distance."""
+    aside = LANE_Y_M + BACK_ASIDE_M
+    way = Path.along(np.array([from_m, (1.6, aside), (-1.6, aside), to_m]), 0.3)
+    return drive(way, from_m, person.no_hand, BACK_M_S)
+
+
+def standing(at_m: FloatArray, seconds: float) -> Drive:
+    """The robot stands."""
+    count = round(seconds / STEP_S)
+    return Drive(np.tile(at_m, (count, 1)), np.zeros((count, 2)))
+
+
+def _either_first(rng: np.random.Generator) -> tuple[float, float]:
+    """Offsets of the first cycle's starts: left and right, in random order."""
+    return (OFFSET_M, -OFFSET_M) if rng.random() < 0.5 else (-OFFSET_M, OFFSET_M)
+
+
+def _nominal() -> Path:
+    """The straight way."""
+    return Path.along(np.array([(START_X_M, LANE_Y_M), (GOAL_X_M, LANE_Y_M)]))
+
+
+def _scene(hallway: Hallway, offset_m: float) -> Scene:
+    """The hallway's scene from a start aside of the nominal path."""
+    ends = hallway.free.cells_of([(START_X_M, LANE_Y_M + offset_m), (GOAL_X_M, LANE_Y_M)])
+    return Scene.on(hallway.free, ends[0], ends[1], hallway.person_m[None])
+
+
+def _pushed(hallway: Hallway, truth: Reward, plan: Path, offset_m: float, cycle: int, rng: np.random.Generator) -> Pass:
+    """A pass in which the person may push the robot off its plan."""
+    side = person.side_of(plan.xy_m, hallway.person_m) if cycle > 1 else offset_m
+    wanted = person.drawn_path(_scene(hallway, offset_m), truth, rng, side)
+    hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=True)
+    start = np.array([START_X_M, LANE_Y_M + offset_m])
+    return Pass(Condition.FORCE, cycle, plan, drive(plan, start, hand))
+
+
+def _steered(hallway: Hallway, truth: Reward, rng: np.random.Generator) -> Pass:
+    """A pass in which the person corrects the straight way with a joystick."""
+    plan = _nominal()
+    wanted = person.drawn_path(_scene(hallway, 0.0), truth, rng)
+    hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=False)
+    return Pass(Condition.JOYSTICK, None, plan, drive(plan, plan.xy_m[0], hand))
+
+
+def _as_demonstration(hallway: Hallway, one: Pass, name: str) -> Demonstration:
+    """What the robot learns from between the cycles."""
+    xy = one.drive.xy_m[::3]
+    cells = rasterize(xy, hallway.free)
+    zeros = np.zeros(len(xy))
+    return Demonstration(
+        id=name,
+        participant=name,
+        condition=one.condition,
+        corrected=True,
+        cycle=one.cycle,
+        start_ns=0,
+        t_s=np.arange(len(xy), dtype=float) * 3 * STEP_S,
+        xy_m=xy,
+        yaw_rad=zeros,
+        force_n=None,
+        contacts=(),
+        goal_m=(GOAL_X_M, LANE_Y_M),
+        people_m=hallway.person_m[None],
+        robot_radius_m=ROBOT_RADIUS_M,
+        grid=hallway.free.freed(cells),
+        cells=cells,
+    )
