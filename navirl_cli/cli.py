@@ -1,0 +1,79 @@
+"""The command line: subcommands are loaded when called, and known trouble becomes a message here and only here."""
+
+import sys
+from importlib import import_module
+from typing import Any
+
+import click
+
+from navirl_cli import __version__
+from navirl_cli.errors import NavirlError
+
+#: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME; it is loaded when called, so
+#: that help and completion stay fast.
+COMMANDS = {
+    "extract": "Turn MCAP logs into demonstrations.",
+    "fit": "Learn a navigation reward from demonstrations.",
+    "evaluate": "Measure demonstrated, learnt and baseline paths.",
+    "plot": "Draw paths, policy, reward or path properties.",
+    "simulate": "Write simulated logs of people pushing a robot, with known truth.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Names in the order of the work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import a command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = getattr(import_module(f"navirl_cli.commands.{cmd_name}"), cmd_name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Suggest near names for an unknown one."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"No such command {args[0]!r}; commands are {', '.join(COMMANDS)}.")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; known trouble becomes one line on stderr and exit code 1."""
+        try:
+            return super().invoke(ctx)
+        except NavirlError as error:
+            if ctx.params.get("debug"):
+                raise
+            click.echo(f"navirl: {error}", err=True)
+            ctx.exit(1)
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="navirl")
+@click.option("--debug", is_flag=True, help="Show the traceback of known trouble too.")
+def cli(debug: bool) -> None:
+    """Learn how a robot should drive around people from people pushing it.
+
+    \b
+    navirl extract logs/*.mcap -o demos.json
+    navirl fit demos.json -o reward.json
+    navirl evaluate demos.json --reward reward.json
+    navirl plot policy demos.json --reward reward.json -o policy.pdf
+
+    Exit codes: 0 done, 1 known trouble, 2 wrong usage, 3 done but some data was lost or skipped.
+    """  # noqa: D301 click reads the \b
+
+
+def main() -> None:
+    """Entry point of the command ``navirl``."""
+    sys.exit(cli(prog_name="navirl"))

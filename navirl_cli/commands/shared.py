@@ -1,0 +1,111 @@
+"""What several commands have in common: options, tables, progress bars, and the end of a run."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+FilePath = click.Path(path_type=Path)
+
+force_option = click.option("--force", is_flag=True, help="Replace existing files.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON in place of the table.")
+seed_option = click.option("--seed", default=0, show_default=True, help="Seed of everything drawn by chance.")
+samples_option = click.option(
+    "--samples",
+    default=100,
+    show_default=True,
+    type=click.IntRange(min=1),
+    help="Paths drawn from the learnt policy for every demonstration.",
+)
+demos_argument = click.argument("demos", type=FilePath)
+
+
+def output_option(what: str, *, required: bool = True) -> Callable[[Function], Function]:
+    """``-o/--output`` with its help."""
+    return click.option("-o", "--output", type=FilePath, required=required, help=what)
+
+
+class Point(click.ParamType):  # type: ignore[type-arg]
+    """A point as ``x,y`` in m."""
+
+    name = "x,y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Parse two numbers."""
+        try:
+            x, y = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"expected two numbers of metres as x,y, found {value!r}", param, ctx)
+        return x, y
+
+
+class Pair(click.ParamType):  # type: ignore[type-arg]
+    """``NAME=VALUE``."""
+
+    name = "name=value"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        """Split at the first equals sign."""
+        name, equals, rest = str(value).partition("=")
+        if not (name and equals and rest):
+            self.fail(f"expected NAME=VALUE, found {value!r}", param, ctx)
+        return name, rest
+
+
+def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns aligned by their widest entry; those that begin with a digit or a sign to the right."""
+    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
+    right = [all(row[i][:1] in "-+0123456789n" for row in rows) for i in range(len(header))]
+    lines = []
+    for row in (header, *rows):
+        cells = [cell.rjust(w) if r else cell.ljust(w) for cell, w, r in zip(row, widths, right, strict=True)]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def echo_json(document: Any) -> None:
+    """JSON on stdout."""
+    click.echo(json.dumps(document, indent=2, allow_nan=False))
+
+
+def say(line: str) -> None:
+    """A diagnostic on stderr."""
+    click.echo(f"navirl: {line}", err=True)
+
+
+def finish(lost: Sequence[str]) -> None:
+    """List what was lost or skipped and exit with 3, or return where nothing was."""
+    for line in lost:
+        say(line)
+    if lost:
+        click.get_current_context().exit(3)
+
+
+@contextmanager
+def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[int, str], None]]:
+    """A bar on stderr, where stderr is a terminal.
+
+    Args:
+        label: What goes on.
+        length: Number of steps, or None where it is not known.
+
+    Yields:
+        A function that takes the number of steps done and a word on the present one.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _done, _word: None
+        return
+    steps = None if length is not None else iter(int, 1)
+    with click.progressbar(
+        steps, length=length, label=label, file=sys.stderr, item_show_func=lambda word: str(word or "")
+    ) as bar:
+
+        def update(done: int, word: str) -> None:
+            bar.update(max(0, done - bar.pos), word)  # type: ignore[arg-type]
+
+        yield update

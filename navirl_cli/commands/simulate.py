@@ -1,0 +1,48 @@
+"""``navirl simulate``: logs of simulated people pushing a simulated robot."""
+
+from functools import partial
+from pathlib import Path
+
+import click
+
+from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option, text_table
+from navirl_cli.errors import ArtefactError
+from navirl_cli.files import check_writable
+from navirl_cli.parallel import map_in_order
+
+
+@click.command()
+@output_option("Folder for the logs, one a participant; made where it is missing.")
+@click.option("--participants", default=3, show_default=True, type=click.IntRange(1, 99), help="How many.")
+@seed_option
+@force_option
+def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
+    """Write simulated logs of people pushing a robot, with known truth.
+
+    Each participant has a reward of their own, drawn around the published one, and pushes the robot toward paths drawn
+    from it: two passes, a fit, two passes along learnt paths, two passes with a joystick, one left to obstacle
+    avoidance. What truly happened stands in the metadata record navirl.truth, which no other command reads.
+    """
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ArtefactError(f"{output}: cannot be made a folder: {error.strerror}; choose another with -o") from error
+    paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
+    for path in paths:
+        check_writable(path, force=force)
+    rows = []
+    with progress_bar("simulate", participants) as update:
+        work = partial(_simulated, seed=seed, force=force)
+        for row in map_in_order(work, list(enumerate(paths, start=1))):
+            rows.append(row)
+            update(len(rows), row[0])
+    click.echo(text_table(("log", "trials", "size MB"), rows))
+
+
+def _simulated(job: tuple[int, Path], seed: int, force: bool) -> tuple[str, str, str]:
+    """One participant's log, as a row of the table."""
+    from navirl_cli.simulation.log import write_log
+
+    number, path = job
+    session = write_log(number, seed, path, force=force)
+    return str(path), str(len(session.passes)), f"{path.stat().st_size / 1e6:.2f}"

@@ -1,0 +1,337 @@
+"""The commands as a user meets them: outputs, messages, exit codes, files."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from robot_log import Run, write_run
+
+from navirl_cli.artefacts import read_json
+from navirl_cli.cli import COMMANDS, cli
+
+SAMPLES = Path(__file__).parent.parent / "sample_logs"
+
+
+@pytest.fixture
+def navirl(tmp_path, monkeypatch):
+    """Run navirl in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words, code=0):
+        result = CliRunner().invoke(cli, [str(word) for word in words])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert result.exit_code == code, result.output
+        return result
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    """Demonstrations and a reward of one sample log."""
+    folder = tmp_path_factory.mktemp("work")
+    runner = CliRunner()
+    for words in (
+        ["extract", SAMPLES / "p01.mcap", "-o", folder / "demos.json"],
+        ["fit", folder / "demos.json", "--condition", "force", "--cycle", "2", "-o", folder / "reward.json"],
+    ):
+        assert runner.invoke(cli, [str(word) for word in words]).exit_code == 0
+    return folder
+
+
+def log_with(tmp_path, name="run.mcap", **changes):
+    return write_run(tmp_path / name, replace(Run(), **changes))
+
+
+def test_help_lists_each_command_as_it_describes_itself(navirl):
+    text = navirl("--help").output
+    for name, summary in COMMANDS.items():
+        command = getattr(import_module(f"navirl_cli.commands.{name}"), name)
+        assert command.get_short_help_str(200).rstrip(".") == summary.rstrip(".")
+        assert summary in " ".join(text.split())
+        assert command.help.split(".")[0] in " ".join(navirl(name, "--help").output.split())
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys; from navirl_cli.cli import cli; cli(['--help'], standalone_mode=False); print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "scipy", "matplotlib", "mcap", "rosbags", "jsonschema"} & set(modules)
+    assert "click" in modules
+
+
+def test_an_unknown_command_and_no_command(navirl):
+    assert "No such command 'learn'; commands are extract, fit" in navirl("learn", code=2).stderr
+    assert "Usage" in navirl(code=2).output
+
+
+def test_version_and_module():
+    out = subprocess.run([sys.executable, "-m", "navirl_cli", "--version"], capture_output=True, text=True, check=True)
+    assert out.stdout.startswith("navirl, version 0.")
+
+
+def test_completion_works():
+    env = {**os.environ, "_NAVIRL_COMPLETE": "bash_complete", "COMP_WORDS": "navirl ex", "COMP_CWORD": "1"}
+    code = "from navirl_cli.cli import main; main()"
+    out = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert "extract" in out.stdout
+
+
+def test_extract_prints_a_row_a_trial(navirl, tmp_path):
+    log = log_with(tmp_path)
+    result = navirl("extract", log, "-o", "demos.json")
+    header, row = result.stdout.splitlines()
+    assert header.split("  ")[0] == "trial"
+    *words, duration, length, cells, contacts, share, peak, impulse, direction = row.split()
+    assert words == ["run/1", "force", "-"]
+    assert (float(duration), float(length)) == pytest.approx((10.7, 4.0), abs=0.1)
+    assert (cells, contacts) == ("41", "1")
+    assert (float(share), float(peak), float(impulse)) == pytest.approx((19, 12.5, 24.0), abs=0.6)
+    assert float(direction) == pytest.approx(90, abs=2)
+    assert result.stderr == ""
+    document = read_json(Path("demos.json"), "demonstrations")
+    assert document["inputs"][0]["file"] == "run.mcap"
+    assert document["settings"]["split"] == "goal"
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_extract_json_has_numbers(navirl, tmp_path):
+    (row,) = json.loads(navirl("extract", log_with(tmp_path), "-o", "demos.json", "--json").stdout)
+    assert (row["trial"], row["cells"], row["cycle"]) == ("run/1", 41, None)
+    assert row["impulse Ns"] == pytest.approx(24, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "message"),
+    [
+        ({"wrench_topics": ()}, (), r"run.mcap: no wrench: expected a topic of type geometry_msgs/msg/WrenchStamped"),
+        (
+            {"odometry": False},
+            (),
+            "run.mcap: no odometry: expected a topic of type nav_msgs/msg/Odometry; the",
+        ),
+        ({"map": False}, (), "run.mcap: no map: expected a topic of type nav_msgs/msg/OccupancyGrid"),
+        (
+            {"wrench_topics": ("/wrench", "/raw")},
+            (),
+            "several topics could be the wrench (geometry_msgs/msg/WrenchStamped): /raw, /wrench; choose one with",
+        ),
+        (
+            {},
+            ("--topic", "wrench=/nope"),
+            "--topic wrench=/nope: expected geometry_msgs/msg/WrenchStamped, but",
+        ),
+        (
+            {},
+            ("--topic", "wrench=/odom"),
+            "expected geometry_msgs/msg/WrenchStamped, but it holds nav_msgs/msg/Od",
+        ),
+        ({}, ("--topic", "lidar=/scan"), "--topic: no role is called lidar; roles are wrench, odometry, map"),
+        ({"map_to_odom": False}, (), "odometry of 'base' is given in frame 'odom': transform from 'odom' to 'map'"),
+        ({"sensor_mounted": False}, (), "the wrench is given in frame 'sensor': transform from 'sensor' to 'base'"),
+        ({"map_yaw": 0.5}, (), "expected a map whose cells run along its frame's axes, found one turned by 28.6 deg"),
+        ({"moves": False}, (), "no trial became a demonstration"),
+        ({"goals": ()}, (), "no goal is announced, so that trials cannot be split at goals"),
+        ({}, ("--person", "0,0.1"), "a person at x 0.00 m, y 0.10 m stands on the path's start"),
+        ({}, ("-o", "no/demos.json"), "no/demos.json: expected an existing folder, found none at no; create it"),
+    ],
+)
+def test_extract_says_in_one_line_what_is_wrong(navirl, tmp_path, changes, options, message):
+    result = navirl("extract", log_with(tmp_path, **changes), "-o", "demos.json", *options, code=1)
+    assert message in result.stderr
+    assert result.stderr.startswith("navirl: ")
+    assert result.stderr.count("\n") == 1
+    assert result.stdout == ""
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"#ROSBAG V2.0\n" + b"x" * 50, "rosbags-convert --src"),
+        (b"SQLite format 3\0" + b"x" * 50, "rosbags-convert --src"),
+        (b"", "empty"),
+        (b"hello", "MCAP"),
+    ],
+)
+def test_other_formats_are_named_with_the_way_out(navirl, tmp_path, content, message):
+    path = tmp_path / "log.bag"
+    path.write_bytes(content)
+    stderr = navirl("extract", path, "-o", "demos.json", code=1).stderr
+    assert message in stderr
+    assert stderr.count("\n") == 1
+    assert "log.bag" in stderr
+
+
+def test_a_missing_log(navirl):
+    assert "none.mcap" in navirl("extract", "none.mcap", "-o", "demos.json", code=1).stderr
+
+
+def test_a_bad_log_among_good_ones_is_left_out_with_exit_code_3(navirl, tmp_path):
+    good, bad = log_with(tmp_path, "a.mcap"), log_with(tmp_path, "b.mcap", wrench_topics=())
+    result = navirl("extract", good, bad, "-o", "demos.json", code=3)
+    assert "left out: " in result.stderr
+    assert "b.mcap: no wrench" in result.stderr
+    assert [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]] == ["a/1"]
+    both = navirl("extract", bad, bad, "-o", "other.json", code=1).stderr
+    assert both.count("no wrench") == 2
+
+
+def test_a_cut_log_gives_what_is_left_with_exit_code_3(navirl, tmp_path):
+    whole = log_with(tmp_path)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole.read_bytes()[:-30])
+    result = navirl("extract", cut, "-o", "demos.json", code=3)
+    assert "cut/1" in result.stdout
+    assert "cut.mcap" in result.stderr
+
+
+def test_a_skipped_trial_is_told_with_exit_code_3(navirl, tmp_path):
+    log = log_with(tmp_path, goals=((1.5, 4.0, 0.0), (13.0, 0.0, 0.0)))
+    result = navirl("extract", log, "-o", "demos.json", code=3)
+    assert "the trial 13.0 s after its start: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
+    assert result.stdout.count("run/") == 1
+
+
+def test_notes_go_to_stderr(navirl, tmp_path):
+    log = log_with(tmp_path, obstacles=((30, 17),), people=None)
+    stderr = navirl("extract", log, "-o", "demos.json").stderr
+    assert "navirl: run/1: 5 driven cells that the map calls occupied were freed" in stderr
+    assert "run/1: no people in the scene; say where they stand with --person x,y" in stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("extract", "-o", "x.json"),
+        ("extract", "a.mcap"),
+        ("extract", "a.mcap", "-o", "x.json", "--person", "1"),
+        ("extract", "a.mcap", "-o", "x.json", "--robot-radius", "-1"),
+        ("extract", "a.mcap", "-o", "x.json", "--topic", "wrench"),
+        ("extract", "a.mcap", "-o", "x.json", "--split", "never"),
+        ("fit", "demos.json", "-o", "r.json", "--condition", "magic"),
+        ("fit", "demos.json", "-o", "r.json", "--init", "c0=a"),
+        ("fit", "demos.json", "-o", "r.json", "--init", "c7=1"),
+        ("fit", "demos.json", "-o", "r.json", "--l2", "-1"),
+        ("evaluate", "demos.json", "--json", "--csv"),
+        ("plot", "nothing", "demos.json"),
+    ],
+)
+def test_wrong_usage_exits_with_2(navirl, words):
+    assert "Error:" in navirl(*words, code=2).stderr
+
+
+def test_debug_shows_the_traceback(navirl):
+    with pytest.raises(Exception, match=r"none\.mcap"):
+        navirl("--debug", "extract", "none.mcap", "-o", "demos.json")
+
+
+def test_fit_reports_and_writes_the_reward(navirl, work):
+    result = navirl("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "-o", "reward.json")
+    lines = result.stdout.splitlines()
+    assert [line.split()[0] for line in lines[1:5]] == ["c0", "a_g", "a_p", "sigma_p"]
+    assert "status           converged" in result.stdout
+    document = read_json(Path("reward.json"), "reward")
+    assert document["demonstrations"] == ["p01/3", "p01/4"]
+    assert document["participants"] == ["p01"]
+    assert document["log_likelihood"] > document["log_likelihood_initial"] > document["log_likelihood_uniform"]
+    assert document["inputs"][0]["file"] == "demos.json"
+    assert Path("reward.json").read_bytes() == (work / "reward.json").read_bytes()
+
+
+def test_fit_starts_from_parameters_and_from_an_earlier_reward(navirl, work):
+    common = ("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "--json")
+    first = json.loads(navirl(*common, "-o", "a.json", "--init", "c0=-60,a_p=-8").stdout)
+    assert first["initial"] == {"c0": -60.0, "a_g": -0.01, "a_p": -8.0, "sigma_p": 2.0}
+    again = json.loads(navirl(*common, "-o", "b.json", "--init", "a.json").stdout)
+    assert again["log_likelihood_initial"] == pytest.approx(first["log_likelihood"], abs=1e-6)
+    for old, new in zip(first["parameters"], again["parameters"], strict=True):
+        assert new["value"] == pytest.approx(old["value"], rel=1e-3)
+
+
+def test_fit_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
+    demos = work / "demos.json"
+    for words, message in (
+        (("--condition", "joystick", "--cycle", "2"), "no demonstration to learn from: check --condition, --cycle"),
+        (("--init", "none.json"), "none.json: cannot be read"),
+        (("--init", "c0=-5"), "infinite partition function: a step costs so little"),
+        (("--init", demos), "expected navirl reward (format 'navirl/reward'), found a file of format"),
+    ):
+        stderr = navirl("fit", demos, "-o", "r.json", *words, code=1).stderr
+        assert message in stderr
+        assert stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+    Path("r.json").write_text("mine")
+    assert "r.json: exists already" in navirl("fit", demos, "-o", "r.json", code=1).stderr
+    assert Path("r.json").read_text() == "mine"
+
+
+def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
+    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "20")
+    table = navirl(*words, "-o", "metrics.csv").stdout
+    document = json.loads(navirl(*words, "--json", "-o", "metrics.json").stdout)
+    assert read_json(Path("metrics.json"), "metrics")["groups"] == document["groups"]
+    rows = list(csv.DictReader(io.StringIO(navirl(*words, "--csv").stdout)))
+    assert Path("metrics.csv").read_text() == navirl(*words, "--csv").stdout
+    assert len(rows) == len(document["groups"]) == 4 * 5
+    for row, group in zip(rows, document["groups"], strict=True):
+        assert (row["group"], row["paths"], int(row["n"])) == (group["group"], group["paths"], group["count"])
+        assert float(row["length_m_mean"]) == pytest.approx(group["mean"]["length_m"], rel=1e-5)
+        assert f"{group['mean']['area_m2']:.3f}" in table
+    assert [d["id"] for d in document["demonstrations"]] == [f"p01/{n}" for n in range(1, 8)]
+
+
+def test_evaluate_knows_one_seed_from_another(navirl, work):
+    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "5", "--csv")
+    assert navirl(*words).stdout == navirl(*words, "--seed", "0").stdout
+    assert navirl(*words).stdout != navirl(*words, "--seed", "1").stdout
+
+
+def test_evaluate_without_a_reward_measures_no_learnt_paths(navirl, work):
+    document = json.loads(navirl("evaluate", work / "demos.json", "--json").stdout)
+    assert document["samples"] == 0
+    assert {group["paths"] for group in document["groups"]} == {"driven", "driven, on grid", "nominal", "avoidance"}
+    message = navirl("evaluate", work / "demos.json", "-o", "m.txt", code=1).stderr
+    assert "m.txt: expected a name that ends in .json or .csv, found '.txt'" in message
+
+
+def test_plot_draws_every_kind(navirl, work):
+    reward = ("--reward", work / "reward.json")
+    for kind, words in (
+        ("paths", ()),
+        ("policy", (*reward, "--trial", "p01/3")),
+        ("reward", reward),
+        ("properties", (*reward, "--samples", "5")),
+    ):
+        for suffix, magic in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+            name = kind + suffix
+            assert navirl("plot", kind, work / "demos.json", *words, "-o", name).stdout == f"{name}\n"
+            assert Path(name).read_bytes().startswith(magic)
+
+
+def test_plot_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
+    demos, reward = work / "demos.json", ("--reward", work / "reward.json")
+    for words, message in (
+        (("paths", demos, "-o", "a.gif"), "a.gif: a figure is saved as .png, .pdf or .svg"),
+        (("policy", demos, *reward, "-o", "a.png", "--trial", "p9/9"), "no trial is called 'p9/9'; there are p01/1"),
+        (("policy", demos, "--reward", demos, "-o", "a.png"), "expected navirl reward"),
+    ):
+        assert message in navirl("plot", *words, code=1).stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_simulate_writes_logs_that_extract_reads(navirl):
+    out = navirl("simulate", "-o", "logs", "--participants", "1", "--seed", "3").stdout
+    assert "p01.mcap" in out
+    navirl("extract", "logs/p01.mcap", "-o", "demos.json")
+    assert "exists already" in navirl("simulate", "-o", "logs", "--participants", "1", code=1).stderr
+    Path("file").write_text("")
+    assert "file: cannot be made a folder" in navirl("simulate", "-o", "file", code=1).stderr
