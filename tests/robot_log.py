@@ -32,8 +32,23 @@ class Run:
     sensor_mounted: bool = True
     #: Yaw of the wrench's frame on the robot, rad.
     sensor_yaw: float = 1.2
+    #: How fast the sensor turns on the robot, rad/s.
+    sensor_turns: float = 0.0
+    #: Topics whose header stamps are 0.
+    unstamped: tuple[str, ...] = ()
+    people_frame: str = "map"
+    goal_frame: str = "map"
+    #: Cells missing from the map's data.
+    map_short_by: int = 0
+    resolution_m: float = 0.1
+    #: Odometry messages with numbers that are not finite, and with a quaternion of zeros.
+    odometry_nan: int = 0
+    odometry_zero: int = 0
+    wrench_nan: int = 0
+    #: Where an axis of the joystick rests.
+    stick_rest: float = 0.0
     moves: bool = True
-    joystick: bool = False
+    joystick: str = ""
     session: dict[str, str] | None = None
 
 
@@ -50,13 +65,14 @@ def write_run(path: Path, run: Run = Run()) -> Path:
             _odometry(log, run)
         for seconds, x, y in run.goals:
             at = START_NS + round(seconds * 1e9)
-            log.message("/goal_pose", message_type("geometry_msgs/msg/PoseStamped")(header(at, "map"), _pose(x, y)), at)
+            head = header(0 if "/goal_pose" in run.unstamped else at, run.goal_frame)
+            log.message("/goal_pose", message_type("geometry_msgs/msg/PoseStamped")(head, _pose(x, y)), at)
         if run.people is not None:
             poses = [_pose(x, y) for x, y in run.people]
-            people = message_type("geometry_msgs/msg/PoseArray")(header(START_NS, "map"), poses)
+            people = message_type("geometry_msgs/msg/PoseArray")(header(START_NS, run.people_frame), poses)
             log.message("/people", people, START_NS)
         if run.joystick:
-            _joystick(log)
+            _joystick(log, run)
         if run.session is not None:
             log.metadata("navirl.session", run.session)
     return path
@@ -79,9 +95,11 @@ def _map(run: Run) -> Any:
     for column, row in run.obstacles:
         data[row, column] = 100
     info = message_type("nav_msgs/msg/MapMetaData")(
-        header(START_NS, "").stamp, 0.1, 60, 30, _pose(-1.05, -1.55, run.map_yaw)
+        header(START_NS, "").stamp, run.resolution_m, 60, 30, _pose(-1.05, -1.55, run.map_yaw)
     )
-    return message_type("nav_msgs/msg/OccupancyGrid")(header(START_NS, "map"), info, data.reshape(-1))
+    return message_type("nav_msgs/msg/OccupancyGrid")(
+        header(START_NS, "map"), info, data.reshape(-1)[run.map_short_by :]
+    )
 
 
 def _transforms(log: LogWriter, run: Run) -> None:
@@ -94,7 +112,11 @@ def _transforms(log: LogWriter, run: Run) -> None:
         )
         return message_type("geometry_msgs/msg/TransformStamped")(header(t_ns, parent), child, motion)
 
-    if run.sensor_mounted:
+    if run.sensor_turns:
+        for step in range(29):
+            at = START_NS + step * 500_000_000
+            log.message("/tf", tf([stamped(at, "base", "sensor", _pose(0, 0, run.sensor_turns * step / 2))]), at)
+    elif run.sensor_mounted:
         log.message("/tf_static", tf([stamped(START_NS, "base", "sensor", _pose(0, 0, run.sensor_yaw))]), START_NS)
     if run.map_to_odom:
         # The odometry's frame is turned by 90 degrees and moved.
@@ -110,6 +132,7 @@ def _wrench(log: LogWriter, topic: str, run: Run, rng: np.random.Generator) -> N
     cos, sin = np.cos(run.sensor_yaw), np.sin(run.sensor_yaw)
     force = np.column_stack([cos * push[:, 0] + sin * push[:, 1], -sin * push[:, 0] + cos * push[:, 1], 0 * seconds])
     force += np.array([3.0, -2.0, 5.0]) + rng.normal(0, 0.2, force.shape)
+    force[200 : 200 + run.wrench_nan] = np.nan
     vector = message_type("geometry_msgs/msg/Vector3")
     wrench = message_type("geometry_msgs/msg/Wrench")(vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
     template = message_type("geometry_msgs/msg/WrenchStamped")(header(0, "sensor"), wrench)
@@ -132,12 +155,19 @@ def _odometry(log: LogWriter, run: Run) -> None:
         message_type("geometry_msgs/msg/TwistWithCovariance")(twist, np.zeros(36)),
     )
     columns = {"pose.pose.position.x": moved[:, 1], "pose.pose.position.y": -moved[:, 0]}
+    columns["pose.pose.position.x"][max(0, 420 - run.odometry_nan) :] = np.nan
+    turn = np.full((len(seconds), 2), (np.sin(-np.pi / 4), np.cos(-np.pi / 4)))
+    turn[200 : 200 + run.odometry_zero] = 0.0
+    columns["pose.pose.orientation.z"], columns["pose.pose.orientation.w"] = turn.T
     log.columns("/odom", template, times, {"header.stamp": times, **columns})
 
 
-def _joystick(log: LogWriter) -> None:
+def _joystick(log: LogWriter, run: Run) -> None:
     for step in range(280):
         at = START_NS + step * 50_000_000
-        axes = np.array([0.0, 0.7 if 100 <= step < 140 else 0.0], dtype=np.float32)
-        joy = message_type("sensor_msgs/msg/Joy")(header(at, ""), axes, np.zeros(0, dtype=np.int32))
+        axes = np.array([0.0, 0.7 if 100 <= step < 140 else 0.0, run.stick_rest], dtype=np.float32)
+        axes = axes if run.joystick == "moved" else axes[[0, 2]]
+        joy = message_type("sensor_msgs/msg/Joy")(
+            header(0 if "/joy" in run.unstamped else at, ""), axes, np.zeros(0, dtype=np.int32)
+        )
         log.message("/joy", joy, at)

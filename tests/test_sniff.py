@@ -16,7 +16,10 @@ CASES = {
     ),
     "r.db3": (
         b"SQLite format 3\0" + bytes(99),
-        "a ROS 2 bag in SQLite; convert its folder: rosbags-convert --src {dir} --dst r_mcap --dst-storage mcap",
+        (
+            "a ROS 2 bag in SQLite; convert its folder, metadata.yaml included: "
+            "rosbags-convert --src {dir} --dst r_mcap --dst-storage mcap"
+        ),
     ),
     "r.mcap.gz": (gzip.compress(MAGIC), "a file compressed as a whole with gzip; decompress it first: gzip -dk {path}"),
     "r.mcap.zstd": (

@@ -12,7 +12,7 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (
         b"SQLite format 3\0",
         "a ROS 2 bag in SQLite",
-        "convert its folder: " + _CONVERT.replace("{path}", "{dir}"),
+        "convert its folder, metadata.yaml included: " + _CONVERT.replace("{path}", "{dir}"),
     ),
     (b"\x28\xb5\x2f\xfd", "a file compressed as a whole with zstd", "decompress it first: zstd -d {path}"),
     (b"\x04\x22\x4d\x18", "a file compressed as a whole with lz4", "decompress it first: lz4 -d {path}"),

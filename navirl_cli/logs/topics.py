@@ -83,7 +83,12 @@ def _topic_of(role: Role, contents: Contents, wish: str | None) -> str | None:
     if role.remedy is None:
         return None
     empty = f"; {', '.join(fitting)} is there without messages" if fitting else ""
-    listed = ", ".join(f"{topic} ({held})" for topic, held in sorted(types.items())) or "no topics"
+    if not types:
+        raise LogError(
+            f"{contents.path}: holds no messages: the file ends before the first one; "
+            "copy it anew, or use another recording"
+        )
+    listed = ", ".join(f"{topic} ({held})" for topic, held in sorted(types.items()))
     raise LogError(
         f"{contents.path}: no {role.name}: expected a topic of type {role.type_name}{empty}; "
         f"the log holds {listed}; {role.remedy}"
