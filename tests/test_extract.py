@@ -96,7 +96,7 @@ def test_a_threshold_above_the_push_leaves_no_contact(make):
 
 
 def test_a_deflected_joystick_makes_a_joystick_trial(make):
-    d = one(make(joystick=True))
+    d = one(make(joystick="moved"))
     assert (d.condition, d.corrected) == (Condition.JOYSTICK, True)
 
 
@@ -185,7 +185,8 @@ def test_a_loop_that_the_rule_cuts_off_is_told(make):
     way = np.concatenate([recording.xy_m[60:210], loop, recording.xy_m[210:]])
     times = recording.t_ns[0] + np.arange(len(way)) * 33_000_000
     changed = replace(recording, t_ns=times, xy_m=way, yaw_rad=np.zeros(len(way)), goal_t_ns=times[:1])
-    assert one(changed).notes == ("its path on the grid is much shorter than the driven one: the rule cuts loops off",)
+    with pytest.raises(DemonstrationError, match=r"9\.0 m driven become 41 cells: the way crosses itself"):
+        extract(changed, ExtractSettings())
     shaking = recording.xy_m + np.random.default_rng(0).normal(0, 0.004, recording.xy_m.shape)
     assert one(replace(recording, xy_m=shaking)).notes == ()
 
@@ -221,6 +222,77 @@ def test_too_few_wrench_messages(make):
 
 
 def test_numbers_go_on_over_the_logs_of_a_participant(make):
-    d = one(make())
-    other = replace(d, participant="eve")
-    assert [n.id for n in numbered([d, other, d])] == ["run/1", "eve/1", "run/2"]
+    extraction = extract(make(), ExtractSettings())
+    other = replace(extraction, demonstrations=(replace(extraction.demonstrations[0], participant="eve"),))
+    three = replace(extraction, trials=3)
+    found = numbered([three, other, extraction])
+    assert [d.id for d in found] == ["run/1", "eve/1", "run/4"]
+
+
+def test_a_hole_in_the_poses_or_the_wrench_is_no_trial(make):
+    recording = make()
+    seconds = (recording.t_ns - START_NS) / 1e9
+    keep = (seconds < 5) | (seconds > 7.5)
+    holed = replace(recording, t_ns=recording.t_ns[keep], xy_m=recording.xy_m[keep], yaw_rad=recording.yaw_rad[keep])
+    with pytest.raises(DemonstrationError, match=r"trial 1: poses are missing for 2\.\d s"):
+        extract(holed, ExtractSettings())
+    wrench = recording.wrench
+    for since, until, message in ((4.0, 20.0, r"missing for 8\.\d s"), (6.0, 6.9, r"missing for 0\.9 s")):
+        seconds = (wrench.t_ns - START_NS) / 1e9
+        keep = (seconds < since) | (seconds > until)
+        dead = replace(wrench, t_ns=wrench.t_ns[keep], force_n=wrench.force_n[keep])
+        with pytest.raises(DemonstrationError, match="the wrench is " + message):
+            extract(replace(recording, wrench=dead), ExtractSettings())
+    short = (seconds < 6.0) | (seconds > 6.3)
+    gapped = replace(wrench, t_ns=wrench.t_ns[short], force_n=wrench.force_n[short])
+    (note,) = extract(replace(recording, wrench=gapped), ExtractSettings()).notes
+    assert note == "run.mcap: the wrench breaks off for more than 0.1 s, 1 x; straight lines bridge it"
+
+
+def test_wrench_and_poses_of_different_clocks_are_told(make):
+    recording = make()
+    late = replace(recording.wrench, t_ns=recording.wrench.t_ns + 10**18)
+    with pytest.raises(LogError, match=r"wrench and poses share no time: .* \+1000000000 s from the poses"):
+        extract(replace(recording, wrench=late), ExtractSettings())
+
+
+def test_the_same_goal_again_after_the_robot_was_there_starts_a_trial(make):
+    recording = make()
+    there, back = recording.xy_m, recording.xy_m[::-1]
+    way = np.concatenate([there, back[30:-30], there])
+    times = recording.t_ns[0] + np.arange(len(way)) * 33_000_000
+    second = times[len(there) + len(back) - 60]
+    # The robot does not rest at its goal, and its UI repeats the goal while it is there.
+    goal_times = np.array([times[0], times[len(there) - 5], second])
+    twice = replace(
+        recording,
+        t_ns=times,
+        xy_m=way,
+        yaw_rad=np.zeros(len(way)),
+        goal_t_ns=goal_times,
+        goal_m=np.tile((4.0, 0.0), (3, 1)),
+    )
+    first, again = trials_of(twice, Split.GOAL)
+    assert way[first.stop - 1] == pytest.approx([4.0, 0.0], abs=0.05)
+    assert again.first == pytest.approx(len(there) + len(back) - 60, abs=1)
+    assert way[again.stop - 1] == pytest.approx([4.0, 0.0], abs=0.05)
+
+
+def test_a_goal_said_by_the_user_replaces_the_logs(make):
+    d = one(make(goals=((1.5, 1.0, 1.0),)), goal_m=(4.0, 0.0))
+    assert d.goal_m == (4.0, 0.0)
+    assert d.notes == ()
+
+
+def test_a_map_that_denies_the_drive_is_told(make):
+    wall = tuple((column, 15) for column in range(20, 45))
+    with pytest.raises(DemonstrationError, match=r"\d+ of 41 driven cells are occupied on the map grown by 0\.3 m"):
+        extract(make(obstacles=wall), ExtractSettings())
+
+
+def test_people_where_none_can_stand_are_noted(make):
+    d = one(make(obstacles=((30, 27),)), people_m=((1.95 + 0.03, 1.2), (90.0, 0.0)))
+    assert d.notes == (
+        "a person at x 1.98 m, y 1.20 m stands in a wall of the map",
+        "a person at x 90.00 m, y 0.00 m stands off the map",
+    )

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from navirl_cli.demos.grid import MOVES, Grid, grid_from_occupancy
+from navirl_cli.demos.grid import MOVES, Grid, grid_from_occupancy, is_costmap
 from navirl_cli.errors import GridError
 
 DETERMINISTIC = settings(derandomize=True, deadline=None, max_examples=60)
@@ -116,9 +116,19 @@ def test_resampling_to_the_same_size_is_the_same_grid():
 
 def test_a_costmap_is_not_inflated_a_second_time():
     data = np.zeros((5, 5), dtype=np.int8)
-    data[2, 2], data[2, 1], data[0, 0] = 100, 99, 98
+    data[1:4, 1:4], data[2, 2], data[0, 0], data[4, 4] = 99, 100, 98, -1
     grid = grid_from_occupancy(data, 0.1, (0.0, 0.0), robot_radius_m=0.3)
-    assert np.argwhere(grid.occupied).tolist() == [[2, 1], [2, 2]]
+    expected = data >= 99
+    expected[4, 4] = True  # unknown
+    assert (grid.occupied == expected).all()
+
+
+def test_a_99_here_and_there_makes_no_costmap():
+    data = np.zeros((9, 9), dtype=np.int8)
+    data[2, 2], data[2, 3], data[6, 6], data[7, 1] = 100, 99, 100, 70
+    assert not is_costmap(data)
+    grid = grid_from_occupancy(data, 0.1, (0.0, 0.0), robot_radius_m=0.11)
+    assert grid.is_occupied([[1, 2], [1, 7], [2, 7], [6, 5]]).all()
 
 
 def test_a_plain_map_is_grown_by_the_robot_and_its_unknown_cells_are_occupied_but_not_grown():

@@ -55,6 +55,11 @@ def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     if wrench is None or len(wrench.t_ns) < 50:
         found = 0 if wrench is None else len(wrench.t_ns)
         raise LogError(f"{recording.log}: expected a wrench of at least 50 messages, found {found}")
+    if wrench.t_ns[0] > recording.t_ns[-1] or wrench.t_ns[-1] < recording.t_ns[0]:
+        raise LogError(
+            f"{recording.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
+            f"{(int(wrench.t_ns[0]) - int(recording.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
+        )
     rate = 1e9 / float(np.median(np.diff(wrench.t_ns)))
     bias, quiet = quiet_bias(wrench.force_n, rate)
     smooth = _low_pass(wrench.force_n - bias, rate, settings.cutoff_hz)
@@ -143,6 +148,12 @@ def contacts_within(pushes: Pushes, start_ns: int, stop_ns: int) -> tuple[Contac
             )
         )
     return tuple(contacts)
+
+
+def missing_s(pushes: Pushes, start_ns: int, stop_ns: int) -> float:
+    """Longest time within a trial for which there is no force, s."""
+    inside = pushes.t_ns[(pushes.t_ns > start_ns) & (pushes.t_ns < stop_ns)]
+    return float(np.diff(np.concatenate([[start_ns], inside, [stop_ns]])).max() / 1e9)
 
 
 def _low_pass(force_n: FloatArray, rate_hz: float, cutoff_hz: float) -> FloatArray:

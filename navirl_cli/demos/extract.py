@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from navirl_cli.demos.checks import check_cells, check_gaps, check_goal, check_start, people_notes, recording_notes
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid, grid_from_occupancy
-from navirl_cli.demos.lines import path_length_m, thinned
 from navirl_cli.demos.rasterize import rasterize
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Split, Trial, trials_of
 from navirl_cli.errors import DemonstrationError, NavirlError
@@ -18,10 +18,6 @@ from navirl_cli.logs.recording import Declared, Recording
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
 STICK_DEAD_ZONE = 0.1
 STEERED_S = 0.3
-#: A path of cells is longer than its line; one shorter than this share of it has lost something.
-LOOPS = 0.9
-#: A contact must stand out of the noise this many times.
-NOISE_MARGIN = 5.0
 
 
 @dataclass(frozen=True)
@@ -44,11 +40,13 @@ class Extraction:
     """What came out of one recording."""
 
     demonstrations: tuple[Demonstration, ...]
+    #: Trials found, those that were skipped included.
+    trials: int
     #: What was skipped, and why.
     skipped: tuple[str, ...]
     #: What of the log could not be read.
     damage: tuple[str, ...]
-    #: What is odd but was used.
+    #: What is odd about the recording; notes on a trial stand in its demonstration.
     notes: tuple[str, ...]
 
 
@@ -67,8 +65,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     Raises:
         NavirlError: Nothing in the recording is usable.
     """
-    if settings.goal_m is not None and len(recording.goal_t_ns) == 0:
-        recording = replace(recording, goal_t_ns=recording.t_ns[:1], goal_m=np.array([settings.goal_m]))
+    recording = _with_said(recording, settings)
     occupancy = recording.occupancy
     grid = grid_from_occupancy(
         occupancy.data, occupancy.resolution_m, occupancy.origin_m, settings.robot_radius_m
@@ -77,33 +74,54 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     trials = trials_of(recording, settings.split)
     participant = settings.participant or recording.participant or recording.log.removesuffix(".mcap")
     found: list[Demonstration] = []
-    skipped: list[str] = []
+    skipped: list[tuple[int, str]] = []
     for number, trial in enumerate(trials, start=1):
         name = f"{participant}/{number}"
         try:
             found.append(_demonstration(recording, trial, pushes, grid, settings, name))
         except NavirlError as error:
-            seconds = (recording.t_ns[trial.first] - recording.t_ns[0]) / 1e9
-            skipped.append(f"{recording.log}: the trial {seconds:.1f} s after its start: {error}")
+            skipped.append((number, str(error)))
     if not found:
-        reasons = "; ".join(skipped) or "no stretch in which the robot moves"
+        reasons = "; ".join(_grouped(skipped)) or "no goal is announced while poses are recorded"
         raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
-    notes = [
-        *recording.notes,
-        *_noise_notes(recording, pushes, settings.push),
-        *(f"{d.id}: {note}" for d in found for note in d.notes),
-    ]
-    return Extraction(tuple(found), tuple(skipped), recording.damage, tuple(notes))
+    lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
+    notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
+    return Extraction(tuple(found), len(trials), lines, recording.damage, tuple(notes))
 
 
-def numbered(demonstrations: Iterable[Demonstration]) -> list[Demonstration]:
-    """Demonstrations of several logs with ids that are unique: a participant's trials are counted through."""
-    counts: Counter[str] = Counter()
+def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
+    """Demonstrations of several recordings with unique ids: a participant's trials are counted through.
+
+    A trial that was skipped keeps its number, so that an id means the same trial whatever the settings.
+    """
+    before: Counter[str] = Counter()
     unique = []
-    for demonstration in demonstrations:
-        counts[demonstration.participant] += 1
-        unique.append(replace(demonstration, id=f"{demonstration.participant}/{counts[demonstration.participant]}"))
+    for extraction in extractions:
+        counted = Counter({one.participant: extraction.trials for one in extraction.demonstrations})
+        for one in extraction.demonstrations:
+            number = before[one.participant] + int(one.id.rpartition("/")[2])
+            unique.append(replace(one, id=f"{one.participant}/{number}"))
+        before += counted
     return unique
+
+
+def _with_said(recording: Recording, settings: ExtractSettings) -> Recording:
+    """The recording with the goal that the user said in place of its own; without any it is announced at the start."""
+    if settings.goal_m is None:
+        return recording
+    times = recording.goal_t_ns if len(recording.goal_t_ns) else recording.t_ns[:1]
+    return replace(recording, goal_t_ns=times, goal_m=np.tile(settings.goal_m, (len(times), 1)))
+
+
+def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
+    """One line a reason."""
+    by_reason: dict[str, list[str]] = {}
+    for number, reason in skipped:
+        by_reason.setdefault(reason, []).append(str(number))
+    return [
+        f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: {reason}"
+        for reason, numbers in by_reason.items()
+    ]
 
 
 def _demonstration(
@@ -115,22 +133,21 @@ def _demonstration(
     travelled = float(np.hypot(*(xy - xy[0]).T).max())
     if travelled < MIN_TRAVEL_M:
         raise DemonstrationError(f"the robot gets no farther than {travelled:.2f} m: an empty trial")
-    goal = settings.goal_m or trial.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
+    check_gaps(recording, trial, pushes)
+    goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
     people = _people(recording, settings, t_ns[0], t_ns[-1])
-    _check_start(people, xy[0], settings.robot_radius_m)
+    check_start(people, xy[0], settings.robot_radius_m)
     cells = rasterize(xy, grid)
-    blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
-    notes = []
     free = grid.freed(cells)
+    check_cells(cells, xy, grid, settings.robot_radius_m)
+    notes = []
     if not trial.arrived:
-        _check_goal(free, xy[0], goal)
-        notes.append(
-            f"ended {float(np.hypot(*(xy[-1] - goal))):.2f} m from its goal; its last cell stands for the goal"
-        )
+        check_goal(free, xy[0], goal)
+        notes.append(f"ended {np.hypot(*(xy[-1] - goal)):.2f} m from its goal; its last cell stands for the goal")
+    blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
     if blocked:
         notes.append(f"{blocked} driven cells that the map calls occupied were freed")
-    if path_length_m(grid.centres_of(cells)) < LOOPS * path_length_m(thinned(xy, grid.resolution_m)):
-        notes.append("its path on the grid is much shorter than the driven one: the rule cuts loops off")
+    notes += people_notes(recording, people)
     if len(people) == 0:
         notes.append("no people in the scene; say where they stand with --person x,y")
     contacts = contacts_within(pushes, int(t_ns[0]), int(t_ns[-1]))
@@ -159,17 +176,6 @@ def _demonstration(
     )
 
 
-def _noise_notes(recording: Recording, pushes: Pushes, push: PushSettings) -> list[str]:
-    """A threshold within the noise finds contacts where there are none."""
-    if push.begins_n >= NOISE_MARGIN * pushes.noise_n:
-        return []
-    note = (
-        f"{recording.log}: without contact the force still shakes by {pushes.noise_n:.2f} N, so that contacts from "
-        f"{push.begins_n:g} N on may be noise; raise --contact-force to {NOISE_MARGIN * pushes.noise_n:.1f}"
-    )
-    return [note]
-
-
 def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> FloatArray:
     """(p, 2) m: mean places over the trial, by place in the message; the last known ones where it says none."""
     if settings.people_m is not None:
@@ -182,28 +188,6 @@ def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop
     whole = [people for people in during if len(people) == most]
     mean: FloatArray = np.mean(whole, axis=0)
     return mean
-
-
-def _check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
-    """Nobody can stand where the robot starts."""
-    for x, y in people:
-        distance = float(np.hypot(x - start[0], y - start[1]))
-        if distance < radius_m:
-            raise DemonstrationError(
-                f"a person at x {x:.2f} m, y {y:.2f} m stands on the path's start ({distance:.2f} m from the robot's "
-                f"centre, radius {radius_m:.2f} m); check --person, the people topic's frame and --robot-radius"
-            )
-
-
-def _check_goal(grid: Grid, start: FloatArray, goal: tuple[float, float]) -> None:
-    """A goal that the robot did not arrive at must be one that it could have arrived at."""
-    cell = grid.cells_of(goal)
-    if grid.contains(cell) and grid.connected_to(grid.cells_of(start))[cell[1], cell[0]]:
-        return
-    raise DemonstrationError(
-        f"goal unreachable: no free way on the map from x {start[0]:.2f} m, y {start[1]:.2f} m to x {goal[0]:.2f} m, "
-        f"y {goal[1]:.2f} m; check the goal, the map and --robot-radius"
-    )
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

@@ -16,10 +16,14 @@ IntArray = NDArray[np.int64]
 #: Displacements (dx, dy) in cells of the eight moves, in a fixed order that every array "by move" follows.
 MOVES: IntArray = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.int64)
 
+#: Cells finer than this have no meaning for a robot, coarser ones no paths, m.
+MIN_RESOLUTION_M, MAX_RESOLUTION_M = 0.01, 2.0
 #: map_server's default: an occupancy of 65 % and more is an obstacle.
 OCCUPIED_FROM = 65
 #: A costmap marks cells within the robot's inscribed radius 99 and obstacles themselves 100.
-INSCRIBED = 99
+INSCRIBED, LETHAL = 99, 100
+#: Share of the obstacles' cells that are ringed in an inflated costmap; cells seen a moment ago may not be yet.
+MOST = 0.9
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,10 @@ class Grid:
         """The same area on cells of another size: a cell is occupied when it touches an occupied one."""
         if resolution_m == self.resolution_m:
             return self
+        if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+            raise GridError(
+                f"cells must have sides of {MIN_RESOLUTION_M} to {MAX_RESOLUTION_M} m, found {resolution_m} m"
+            )
         rows, columns = (max(1, ceil(n * self.resolution_m / resolution_m - 1e-9)) for n in self.shape)
         occupied = np.zeros((rows, columns), dtype=bool)
         taken = np.argwhere(self.occupied)
@@ -167,14 +175,30 @@ class Grid:
         return Grid(occupied, resolution_m, self.origin_m)
 
 
+def is_costmap(data: NDArray[np.int8]) -> bool:
+    """Whether occupancy is that of an inflated costmap.
+
+    Such a map rings every obstacle (100) with cells within the robot's inscribed radius (99). A map of probabilities
+    may hold a 99 here and there, but not around its obstacles.
+
+    Args:
+        data: (rows, columns), -1 unknown, 0..100.
+    """
+    if not (data == INSCRIBED).any():
+        return False
+    framed = np.pad(data, 1, constant_values=INSCRIBED)
+    rows, columns = np.nonzero(data == LETHAL)
+    around = np.stack([framed[rows + 1 + dy, columns + 1 + dx] for dx, dy in MOVES])
+    return bool(((around >= INSCRIBED) | (around < 0)).all(axis=0).mean() > MOST) if len(rows) else True
+
+
 def grid_from_occupancy(
     data: NDArray[np.int8], resolution_m: float, origin_m: tuple[float, float], robot_radius_m: float
 ) -> Grid:
     """Turn ROS occupancy into a grid for the robot's centre.
 
-    A costmap is recognised by its inscribed cells of 99: it is inflated already, so that its lethal cells are taken as
-    they are. A plain map's obstacles are grown by the robot's radius. Unknown cells (-1) count as occupied: nobody has
-    shown that a robot can drive there.
+    An inflated costmap's lethal cells are taken as they are. A plain map's obstacles are grown by the robot's radius.
+    Unknown cells (-1) count as occupied: nobody has shown that a robot can drive there.
 
     Args:
         data: (rows, columns), -1 unknown, 0..100 per cent, as nav_msgs/OccupancyGrid.
@@ -185,8 +209,8 @@ def grid_from_occupancy(
     Returns:
         The grid.
     """
-    if (data == INSCRIBED).any():
-        return Grid(data >= INSCRIBED, resolution_m, origin_m)
     unknown = data < 0
+    if is_costmap(data):
+        return Grid((data >= INSCRIBED) | unknown, resolution_m, origin_m)
     obstacles = Grid(data >= OCCUPIED_FROM, resolution_m, origin_m).inflated(robot_radius_m)
     return Grid(obstacles.occupied | unknown, resolution_m, origin_m)

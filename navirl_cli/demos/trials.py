@@ -46,9 +46,10 @@ class Trial:
 def trials_of(recording: Recording, split: Split) -> list[Trial]:
     """Split a recording into trials.
 
-    ``goal``: a trial starts when a goal is announced (saying the present goal again while driving to it starts none)
-    and ends where the robot first comes to rest near it, else where it came nearest before the next goal, so that the
-    drive back belongs to no trial. ``stop``: trials are the drives between rests. ``none``: one trial.
+    ``goal``: a trial starts when a goal is announced and ends where the robot first comes to rest near it, else where
+    it came nearest before the next goal, so that the drive back belongs to no trial. Saying the present goal again
+    starts none, unless the robot was there and has left. ``stop``: trials are the drives between rests. ``none``: one
+    trial.
 
     Args:
         recording: Poses and goals.
@@ -91,20 +92,27 @@ def _between_rests(t_ns: IntArray, standing: BoolArray) -> list[Trial]:
 
 
 def _at_goals(recording: Recording, standing: BoolArray) -> list[Trial]:
-    """From each new goal to the rest near it."""
+    """From each new goal to the rest near it, before the next new goal."""
     starts = np.searchsorted(recording.t_ns, recording.goal_t_ns)
-    trials: list[Trial] = []
-    for number, (start, goal) in enumerate(zip(starts.tolist(), recording.goal_m, strict=True)):
-        if trials and start < trials[-1].stop:
-            present = trials[-1].goal_m
-            if present is not None and np.hypot(*(goal - present)) < SAME_GOAL_M:
-                continue
-        later = starts[number + 1 :][np.hypot(*(recording.goal_m[number + 1 :] - goal).T) >= SAME_GOAL_M]
-        border = int(later[0]) if len(later) else len(recording.t_ns)
-        if border - start < 2:
-            continue
-        trials.append(_towards(recording, standing, (start, border), goal))
-    return trials
+    kept: list[tuple[int, FloatArray]] = []
+    for start, goal in zip(starts.tolist(), recording.goal_m, strict=True):
+        if start < len(recording.t_ns) and (not kept or _is_new(recording, kept[-1], start, goal)):
+            kept.append((start, goal))
+    borders = [start for start, _ in kept[1:]] + [len(recording.t_ns)]
+    return [
+        _towards(recording, standing, (start, border), goal)
+        for (start, goal), border in zip(kept, borders, strict=True)
+        if border - start > 1
+    ]
+
+
+def _is_new(recording: Recording, present: tuple[int, FloatArray], start: int, goal: FloatArray) -> bool:
+    """Whether an announcement starts a trial: another goal, or the same after the robot was there and has left."""
+    since, aim = present
+    if np.hypot(*(goal - aim)) >= SAME_GOAL_M:
+        return True
+    distance = np.hypot(*(recording.xy_m[since : start + 1] - goal).T)
+    return bool((distance < ARRIVED_M).any() and distance[-1] > ARRIVED_M)
 
 
 def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], goal: FloatArray) -> Trial:
