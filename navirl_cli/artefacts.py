@@ -1,6 +1,7 @@
 """What navirl writes and reads back: JSON files, versioned, checked against their schema, written whole."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -84,10 +85,10 @@ def read_json(path: Path, kind: str) -> dict[str, Any]:
         ArtefactError: The file is missing, no JSON, of another kind, or breaks the schema.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
         raise ArtefactError(f"{path}: expected a JSON file of navirl {kind}, found none ({error}){hint}") from error
     found = document.get("format") if isinstance(document, dict) else None
@@ -131,9 +132,13 @@ def read_demonstrations(path: Path) -> list[Demonstration]:
     document = read_json(path, "demonstrations")
     try:
         grids = {digest: _grid(content) for digest, content in document["maps"].items()}
-        return [_read(content, grids) for content in document["demonstrations"]]
-    except (NavirlError, ValueError, TypeError, KeyError) as error:
+        found = [_read(content, grids) for content in document["demonstrations"]]
+    except (NavirlError, ValueError, TypeError, KeyError, OverflowError) as error:
         raise ArtefactError(f"{path}: {error}") from error
+    twice = [name for name, count in Counter(one.id for one in found).items() if count > 1]
+    if twice:
+        raise ArtefactError(f"{path}: two demonstrations are called {twice[0]}; ids must be unique")
+    return found
 
 
 def reward_document(
@@ -179,6 +184,10 @@ def read_reward(path: Path) -> LearntReward:
     """
     document = read_json(path, "reward")
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
+    names = [parameter["name"] for parameter in document["parameters"]]
+    missing = {parameter.name for parameter in Reward.named({}).parameters} - set(names)
+    if missing or len(names) > len(values):
+        raise ArtefactError(f"{path}: expected each parameter once, found {', '.join(names)}")
     try:
         reward = Reward.named(values)
     except NavirlError as error:
@@ -206,6 +215,11 @@ def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> Lear
     return learnt
 
 
+def _refuse_constant(name: str) -> float:
+    """NaN and Infinity are no JSON."""
+    raise ValueError(f"{name} is no JSON number")
+
+
 def _number(value: float) -> float | None:
     """JSON knows no NaN."""
     return float(value) if isfinite(value) else None
@@ -226,7 +240,7 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
         "cycle": d.cycle,
         "log": d.log,
         "start_ns": d.start_ns,
-        "t_s": _rounded(d.t_s),
+        "t_s": [round(float(t), 9) for t in d.t_s],
         "x_m": _rounded(d.xy_m[:, 0]),
         "y_m": _rounded(d.xy_m[:, 1]),
         "yaw_rad": _rounded(d.yaw_rad),
@@ -291,7 +305,7 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             log=content["log"],
             notes=tuple(content["notes"]),
         )
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise ValueError(f"demonstration {name}: {error}") from error
 
 

@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 
 from navirl_cli.errors import ArtefactError
 
@@ -23,6 +24,7 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
         ArtefactError: The file exists and may not be replaced, or its folder is missing or cannot be written.
     """
     check_writable(path, force=force)
+    path = path.resolve()  # what a link names is replaced, not the link
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         yield temporary
@@ -39,9 +41,16 @@ def check_writable(path: Path, *, force: bool) -> None:
     Raises:
         ArtefactError: As in :func:`replacing`.
     """
-    if path.is_dir():
-        raise ArtefactError(f"{path}: expected the name of a file to write, found a folder; name a file in it")
-    if path.exists() and not force:
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        kind = None
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be written: {error.strerror}") from error
+    if kind is not None and not S_ISREG(kind):
+        what = "a folder; name a file in it" if S_ISDIR(kind) else "something else; choose another name"
+        raise ArtefactError(f"{path}: expected the name of a file to write, found {what}")
+    if kind is not None and not force:
         raise ArtefactError(f"{path}: exists already; give another name, or --force to replace it")
     if not path.parent.is_dir():
         raise ArtefactError(f"{path}: expected an existing folder, found none at {path.parent}; create it")

@@ -1,8 +1,8 @@
 """Work over many logs or fits, through one function that any executor can stand behind."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
-from os import cpu_count
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -22,7 +22,8 @@ def map_in_order(
     Yields:
         Results in the order of the items.
     """
-    workers = min(len(items), cpu_count() or 1)
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    workers = min(len(items), allowed)
     if executor is not None:
         yield from executor.map(function, items)
     elif workers < 2:

@@ -96,6 +96,12 @@ def extract_coarse(demonstration):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (
+            lambda d: d["demonstrations"][1].update(id="run/1"),
+            "two demonstrations are called run/1; ids must be unique",
+        ),
+        (lambda d: d["demonstrations"][0]["cells"].__setitem__(3, [10**30, 1]), "demonstration run/1: .*too large"),
+        (lambda d: d["demonstrations"][0].update(robot_radius_m=float("nan")), "found none .NaN is no JSON number"),
         (lambda d: d.pop("maps"), "at the whole file: 'maps' is a required property"),
         (lambda d: d.update(version=2), "at version: 1 was expected"),
         (lambda d: d.update(extra=1), r"at the whole file: Additional properties are not allowed \('extra' was"),
@@ -158,8 +164,12 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
     edited(path, lambda d: d["parameters"][0].update(name="c9"))
+    with pytest.raises(ArtefactError, match="expected each parameter once, found c9, a_g, a_p, sigma_p"):
+        read_reward(path)
+    edited(path, lambda d: d["parameters"].append({**d["parameters"][0], "name": "c0"}))
     with pytest.raises(ArtefactError, match="unknown parameter c9; the reward has c0, a_g, a_p, sigma_p"):
         read_reward(path)
+    edited(path, lambda d: d["parameters"].pop())
     edited(path, lambda d: d["parameters"][0].update(name="c0", value=5.0))
     with pytest.raises(ArtefactError, match="c0 = 5 1/m is outside its bounds"):
         read_reward(path)

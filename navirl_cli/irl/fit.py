@@ -42,8 +42,8 @@ _ADVICE = {
     ),
     Status.ON_BOUND: "a parameter ended on its bound, where it has no standard error; more demonstrations may free it",
     Status.NOT_IDENTIFIED: (
-        "the demonstrations do not tell every parameter: what is marked so stayed where it started or may be anything; "
-        "add demonstrations (with people near the path, with detours) or a larger --l2"
+        "the demonstrations do not tell every parameter: the numbers marked so mean nothing by themselves; "
+        "add demonstrations that tell them (people near the path, detours from the nominal path)"
     ),
 }
 
@@ -110,7 +110,9 @@ def fit(
     at_start = problem(problem.to_units(initial.theta))
     if not np.isfinite(at_start.value):
         log_likelihood(evidence, initial)  # raises with the reason
-    identified = problem.identified(at_start)
+    starts = problem.starts(at_start)
+    # A parameter that tells nothing here may tell something there: a person at a distance, seen with another sigma_p.
+    identified = np.any([problem.identified(at_start), *(problem.identified(problem(x)) for x in starts[1:])], axis=0)
     lower, upper = (problem.to_units([getattr(p, side) for p in initial.parameters]) for side in ("lower", "upper"))
     steps = 0
 
@@ -122,8 +124,9 @@ def fit(
 
     best: Maximum | None = None
     evaluations = 0
-    for start in problem.starts(at_start, identified):
-        found = maximise(problem, start, lower, upper, identified, count)
+    for start in starts:
+        # What the data do not tell stays where it was given: elsewhere the regulariser alone would choose.
+        found = maximise(problem, np.where(identified, start, at_start.x), lower, upper, identified, count)
         evaluations += found.evaluations
         if best is None or found.best.value > best.best.value + 1e-9:
             best = found
@@ -178,17 +181,14 @@ class _Problem:
         told: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
         return told
 
-    def starts(self, first: Point, identified: NDArray[np.bool_]) -> list[FloatArray]:
-        """The given start, and others where the likelihood is known to have a second slope (MODEL.md, trap 5).
-
-        What the data do not tell stays where it was given: elsewhere the regulariser alone would choose.
-        """
+    def starts(self, first: Point) -> list[FloatArray]:
+        """The given start, and others: from the study's, Newton's method alone sticks at a_g = 0 on some data."""
         parameters = self.initial.parameters
         starts = [first.x]
         for factors in ({"a_g": -1.0, "sigma_p": 1.0}, {"a_g": -2.0, "sigma_p": 8.0}):
             x = first.x.copy()
             for j, parameter in enumerate(parameters):
-                if identified[j] and parameter.name in factors:
+                if parameter.name in factors:
                     x[j] = factors[parameter.name] / parameter.scale
             if (x != first.x).any():
                 starts.append(x)

@@ -106,7 +106,8 @@ class Scene:
         """(k,) states of the shortest path that keeps nearest to the straight line from start to goal."""
         xy = self.lattice.xy_m - self.lattice.xy_m[self.start]
         ahead = self.lattice.xy_m[self.goal] - self.lattice.xy_m[self.start]
-        aside = np.abs(xy[:, 0] * ahead[1] - xy[:, 1] * ahead[0]) / np.hypot(*ahead)
+        right = (xy[:, 0] * ahead[1] - xy[:, 1] * ahead[0]) / np.hypot(*ahead)
+        aside = np.abs(right) + 1e-3 * right  # of two ways that mirror each other the left one
         # Small enough never to make a longer path the cheaper one.
         tie_break = 1e-8 * aside[:, None] * self.lattice.grid.resolution_m
         return self.lattice.descend(self.start, self.goal, self.lattice.step_m + tie_break)

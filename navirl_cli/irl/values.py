@@ -52,6 +52,10 @@ class InfinitePartitionError(RewardError):
             "or a smaller positive a_p"
         )
 
+    def __reduce__(self) -> tuple[type["InfinitePartitionError"], tuple[ValueStatus]]:
+        """Cross process borders with the status, from which the message is made anew."""
+        return type(self), (self.status,)
+
 
 @dataclass(frozen=True)
 class Policy:
@@ -163,6 +167,8 @@ def solve(lattice: Lattice, goal: int, reward: FloatArray) -> Policy:
     unit[order == goal] = 1.0  # by rank
     first = splitting.factor.solve(unit)
     if not first.max() < ROOM:  # a large map: beside the hard value z leaves the range of a double
+        if (cost > -reward)[lattice.possible].any():
+            raise InfinitePartitionError(ValueStatus.UNDECIDED)  # steps that pay: there is no hard value to start from
         cheapest = max(float(cost[lattice.possible].min()), floor)
         shift = _banded_shift(lattice, reward, cost, shift, order, STEPS_PER_BAND * cheapest)
         splitting = _split(lattice, reward, shift, order)
