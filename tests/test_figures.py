@@ -9,7 +9,7 @@ from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ground import window_around
 from navirl_cli.figures.paths import draw_paths
-from navirl_cli.figures.sheet import new_figure
+from navirl_cli.figures.sheet import new_figure, trim_height
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 
 
@@ -154,9 +154,25 @@ def test_people_and_robot_are_drawn_to_scale_once():
     drawn = draw_paths(one_axes(), ones)
     assert [circle.center for circle in drawn.people] == [(0.0, 0.1), (1.0, -1.0)]
     assert {circle.radius for circle in drawn.people} == {0.25}
+    assert "person (2 places)" in legend_texts(drawn.axes)
     (robot,) = drawn.robots
     np.testing.assert_allclose(robot.center, ones[0].xy_m[0])
     assert robot.radius == 0.3
+
+
+@pytest.mark.parametrize("count", [1, 3, 20])
+def test_people_of_different_trials_do_not_hide_each_other_or_a_path(count):
+    ones = [demonstration(people_m=[(0.05 * n, 0.1)]) for n in range(count)]
+    drawn = draw_paths(one_axes(), ones)
+    discs = [patch for patch in drawn.axes.patches if patch.get_fill()]
+    assert [disc.center for disc in discs] == [outline.center for outline in drawn.people]
+    assert len(discs) == count
+    assert {disc.radius for disc in discs} == {0.25}
+    opacity = discs[0].get_facecolor()[3]
+    assert 1 - (1 - opacity) ** count == pytest.approx(0.9)  # all of them together
+    assert not any(outline.get_fill() for outline in drawn.people)
+    below, above = max(disc.get_zorder() for disc in discs), min(line.get_zorder() for line in drawn.people)
+    assert drawn.obstacles[0].get_zorder() < below < drawn.lines[0].get_zorder() < above
 
 
 def test_starts_apart_have_an_outline_each():
@@ -174,7 +190,7 @@ def test_nobody_is_not_in_the_legend():
 
 
 def test_no_demonstration_is_refused():
-    with pytest.raises(DemonstrationError, match="no demonstration to draw: check --condition"):
+    with pytest.raises(DemonstrationError, match=r"^no demonstration to draw$"):
         draw_paths(one_axes(), [])
 
 
@@ -200,8 +216,25 @@ def test_a_map_of_the_paths_size_is_shown_whole():
     assert window_around([room()], points) == pytest.approx(room().extent_m)
 
 
-def test_points_beyond_the_map_are_shown():
-    assert window_around([room()], np.array([(-3.0, 0.0), (6.0, 0.0)]))[1] == pytest.approx(6.0)
+@pytest.mark.parametrize("beyond", [(50.0, 0.0), (-50.0, 30.0), (6.0, -90.0)])
+def test_points_beyond_the_map_do_not_widen_it(beyond):
+    assert window_around([room()], np.array([(-3.0, 0.0), (3.0, 0.0), beyond])) == pytest.approx(room().extent_m)
+
+
+def test_a_crop_towards_a_point_beyond_the_map_ends_with_the_map():
+    points = np.array([(-1.0, 0.0), (2.0, 0.5), (50.0, 0.0)])
+    assert window_around([room(300, 300, (-15.0, -15.0))], points) == pytest.approx((-2.5, 15.0, -1.5, 2.0))
+
+
+def test_a_goal_far_beyond_the_map_leaves_the_figure_as_it_is():
+    far = Demonstration(**{**vars(demonstration()), "goal_m": (50.0, 0.0)})
+    sizes = []
+    for one in (demonstration(), far):
+        axes = draw_paths(one_axes(), [one]).axes
+        trim_height(axes.figure)
+        np.testing.assert_allclose((*axes.get_xlim(), *axes.get_ylim()), room().extent_m)
+        sizes.append(tuple(axes.figure.get_size_inches()))
+    assert sizes[0] == pytest.approx(sizes[1])
 
 
 def test_a_window_can_be_given():

@@ -7,9 +7,9 @@ import pytest
 from matplotlib.colors import to_rgba
 from test_figures import demonstration, labelled, legend_texts, one_axes
 
-from navirl_cli.figures.cells import LEAST_VISITS, DrawnCells, draw_policy, draw_reward
-from navirl_cli.figures.sheet import new_figure
-from navirl_cli.figures.style import PAGE_IN
+from navirl_cli.figures.cells import LEAST_VISITS, REACH_M, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.style import COLUMN_IN, DPI, PAGE_IN
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, scenes_of
@@ -86,8 +86,11 @@ def test_the_reward_is_drawn_by_cell_on_a_linear_scale():
     reward = PUBLISHED.by_cell(a_scene)
     drawn = draw_reward(one_axes(), a_scene, reward)
     assert_cells(drawn, a_scene, reward)
-    assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == (reward.min(), reward.max())
-    assert drawn.colour_bar.ax.get_ylabel() == "state reward per step"
+    xy = a_scene.lattice.xy_m
+    near = (a_scene.deviation_m <= REACH_M) | (np.hypot(*(xy - a_scene.people_m[0]).T) <= REACH_M)
+    assert 0 < near.sum() < a_scene.lattice.size
+    assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == (reward[near].min(), reward[near].max())
+    assert drawn.colour_bar.ax.get_ylabel() == "state reward per step\n(without cost of way)"
     assert "robot" not in legend_texts(drawn.axes)
 
 
@@ -96,6 +99,79 @@ def test_the_reward_scale_spans_what_is_shown():
     x = a_scene.lattice.xy_m[:, 0]
     drawn = draw_reward(one_axes(), a_scene, x, window_m=(-1.0, 1.0, -2.0, 2.0))
     assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == pytest.approx((-0.95, 0.95))
+
+
+def test_far_corners_do_not_take_the_colours_of_the_personal_space():
+    a_scene = scene()
+    reward = PUBLISHED.by_cell(a_scene)
+    aside = np.hypot(*(a_scene.lattice.xy_m - a_scene.people_m[0]).T)
+    far = (a_scene.deviation_m > REACH_M) & (aside > REACH_M)
+    reward[far] = -100.0
+    drawn = draw_reward(one_axes(), a_scene, reward)
+    assert drawn.image.norm.vmin == reward[~far].min() > -10.0
+    assert drawn.colour_bar.extend == "min"
+    shades = drawn.image.norm(reward[[a_scene.nominal.argmax(), reward[~far].argmin()]])
+    assert shades.max() - shades.min() > 0.5
+
+
+def test_a_person_off_the_nominal_path_is_within_the_scale():
+    a_scene = scene(people_m=[(2.0, 1.5)])
+    reward = np.zeros(a_scene.lattice.size)
+    beside = np.hypot(*(a_scene.lattice.xy_m - (2.0, 1.5)).T) < 0.1
+    assert a_scene.deviation_m[beside].min() > REACH_M
+    reward[beside] = -7.0
+    drawn = draw_reward(one_axes(), a_scene, reward)
+    assert drawn.image.norm.vmin == -7.0
+
+
+@pytest.mark.parametrize(
+    ("beyond", "extend"), [((), "neither"), ((-9.0,), "min"), ((9.0,), "max"), ((-9.0, 9.0), "both")]
+)
+def test_the_bar_of_the_reward_is_pointed_where_cells_lie_beyond_it(beyond, extend):
+    a_scene = scene(people_m=[])
+    reward = np.linspace(-1.0, 1.0, a_scene.lattice.size)
+    far = np.flatnonzero(a_scene.deviation_m > REACH_M)
+    reward[far] = 0.0
+    reward[far[: len(beyond)]] = beyond
+    assert draw_reward(one_axes(), a_scene, reward).colour_bar.extend == extend
+
+
+def test_a_window_away_from_paths_and_people_spans_what_it_shows():
+    a_scene = scene()
+    y = a_scene.lattice.xy_m[:, 1]
+    drawn = draw_reward(one_axes(), a_scene, y, window_m=(-3.0, -2.0, 1.3, 1.6))
+    assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == pytest.approx((1.35, 1.55))
+
+
+@pytest.mark.parametrize("values", ["policy", "reward"])
+def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(values):
+    a_scene, visits = scene_and_visits()
+    draw = draw_policy if values == "policy" else draw_reward
+    drawn = draw(one_axes(), a_scene, visits, robot_radius_m=0.3)
+    (person,) = drawn.people
+    assert not any(patch.get_fill() for patch in drawn.axes.patches)
+    assert to_rgba(person.get_edgecolor()) == to_rgba("black")
+    (halo,) = person.get_path_effects()
+    assert halo._gc["foreground"] == "white"
+    assert halo._gc["linewidth"] > person.get_linewidth()
+    (robot,) = [patch for patch in drawn.axes.patches if patch is not person]
+    assert person.get_linewidth() >= 2 * robot.get_linewidth()  # so that the two are not taken for each other
+    entries = dict(zip(legend_texts(drawn.axes), drawn.axes.get_legend().legend_handles, strict=True))
+    assert entries["person"].get_markerfacecolor() == "none"
+    assert entries["person"].get_markeredgewidth() == person.get_linewidth()
+
+
+@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
+@pytest.mark.parametrize("window", [None, (-3.5, 3.5, -1.0, 1.0)])
+def test_the_label_of_a_colour_bar_is_no_longer_than_the_bar(width_in, window):
+    drawn = draw_reward(one_axes(width_in), scene(), PUBLISHED.by_cell(scene()), window_m=window)
+    drawn.axes.figure.set_dpi(DPI)
+    trim_height(drawn.axes.figure)
+    beside = drawn.colour_bar.orientation == "vertical"
+    axis = drawn.colour_bar.ax.yaxis if beside else drawn.colour_bar.ax.xaxis
+    of_label, of_map = axis.label.get_window_extent(), drawn.axes.get_window_extent()
+    assert (window is None) == beside
+    assert of_label.height <= of_map.height if beside else of_label.width <= of_map.width
 
 
 def test_a_reward_that_is_the_same_everywhere_can_be_drawn():
@@ -107,7 +183,7 @@ def test_a_reward_that_is_the_same_everywhere_can_be_drawn():
 def test_a_colour_bar_is_as_high_as_its_map():
     drawn = draw_reward(one_axes(), scene(), PUBLISHED.by_cell(scene()))
     drawn.axes.figure.draw_without_rendering()
-    of_map, of_bar = drawn.axes.get_window_extent(), drawn.colour_bar.ax.get_window_extent()
+    of_map, of_bar = drawn.axes.get_window_extent(), drawn.colour_bar.outline.get_window_extent()
     assert (of_bar.y0, of_bar.y1) == pytest.approx((of_map.y0, of_map.y1), abs=0.5)
     assert of_bar.x0 > of_map.x1
 

@@ -58,6 +58,54 @@ def test_panels_name_metric_and_unit_and_rows_group_and_count():
     assert bottom > top  # the first row stands at the top
 
 
+def test_a_note_says_what_bars_and_whiskers_are():
+    figure, _ = properties([bar()], COLUMN_IN)
+    assert figure.get_supxlabel() == "bars: mean, whiskers: standard deviation"
+
+
+def test_labels_of_narrow_panels_break_once():
+    _, drawn = properties([bar()], COLUMN_IN)
+    assert [axes.get_xlabel() for axes in drawn.axes] == [
+        "path length\n[m]",
+        "min. distance\n[m]",
+        "area under\npath [m²]",
+    ]
+
+
+@pytest.mark.parametrize("mean", [(6.7, 0.6, 2.1), (9.4, 0.95, 0.3), (11.8, 1.3, 4.9), (24.0, -0.15, 7.9)])
+@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
+def test_an_axis_has_three_ticks_at_least(mean, width_in):
+    _, drawn = properties([bar(mean=mean, std=(0.2, 0.1, 0.1))], width_in)
+    for axes in drawn.axes:
+        low, high = axes.get_xlim()
+        at = axes.get_xticks()
+        assert len(at) >= 3
+        assert low <= at.min() < at.max() <= high
+        texts = [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axes.get_xticklabels()]
+        np.testing.assert_allclose([float(text) for text in texts], at)
+
+
+def test_numbers_too_long_for_three_ticks_have_fewer():
+    figure, drawn = properties([bar(mean=(6543210.0, 0.00123, 2.0), std=(1.0, 0.0001, 0.5))], COLUMN_IN)
+    assert [len(axes.get_xticks()) for axes in drawn.axes] == [2, 2, 3]
+    assert_nothing_touches(figure, drawn)
+
+
+def test_names_of_bars_break_between_words_and_leave_the_panels_their_room():
+    bars = [bar(), bar("force, cycle 2, on grid"), bar("learnt from force, cycle 2", count=600), bar("joystick")]
+    figure, drawn = properties(bars, COLUMN_IN)
+    figure.draw_without_rendering()
+    labels = [label.get_text().replace("\N{NO-BREAK SPACE}", " ") for label in drawn.axes[0].get_yticklabels()]
+    assert labels == [
+        "force, cycle 1\n(n = 12)",
+        "force, cycle 2,\non grid\n(n = 12)",
+        "learnt from\nforce, cycle 2\n(n = 600)",
+        "joystick\n(n = 12)",
+    ]
+    panels = sum(axes.get_window_extent().width for axes in drawn.axes)
+    assert panels > 0.7 * figure.bbox.width
+
+
 def test_a_mean_that_does_not_exist_is_said_to_be_missing():
     nan = float("nan")
     figure, drawn = properties([bar(), bar("alone", "autonomous", (6.0, nan, 0.1), (nan, nan, nan), 1)])
@@ -78,22 +126,26 @@ def test_negative_distances_stay_on_the_paper():
 @pytest.mark.parametrize("rows", [1, 20])
 def test_no_two_labels_touch(width_in, rows):
     bars = [bar(f"force, cycle {n}: driven, on the grid of the map", count=10 * n) for n in range(rows)]
-    figure, drawn = properties(bars, width_in)
+    assert_nothing_touches(*properties(bars, width_in))
+
+
+def assert_nothing_touches(figure, drawn):
     figure.draw_without_rendering()
     boxes = [label.get_window_extent() for label in drawn.axes[0].get_yticklabels()]
     assert all(upper.y0 > lower.y1 for upper, lower in pairwise(boxes))
     labels = [axes.xaxis.label.get_window_extent() for axes in drawn.axes]
     assert all(left.x1 < right.x0 for left, right in pairwise(labels))
+    (note,) = figure.texts
+    assert note.get_window_extent().y1 < min(label.y0 for label in labels)
+    labels.append(note.get_window_extent())
     paper = figure.bbox
     assert all(box.x0 >= 0 and box.x1 <= paper.x1 and box.y0 >= 0 for box in [*boxes, *labels])
-    for axes in drawn.axes:
-        inside = [tick.label1.get_window_extent() for tick in axes.xaxis.get_major_ticks() if tick.get_visible()]
-        shown = [box for box in inside if box.width > 0]
-        assert all(left.x1 < right.x0 for left, right in pairwise(shown))
+    numbers = [label.get_window_extent() for axes in drawn.axes for label in axes.get_xticklabels()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(numbers))  # within a panel and from one to the next
 
 
 def test_no_bar_is_refused():
-    with pytest.raises(DemonstrationError, match="no paths to compare"):
+    with pytest.raises(DemonstrationError, match=r"^no paths to compare$"):
         draw_properties(new_figure(panels=3)[1], [])
 
 

@@ -1,6 +1,7 @@
 """Numbers by cell over the map: the propagated policy and the state reward (Fig. 8)."""
 
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from navirl_cli.figures.ground import (
     legend_below,
     window_around,
 )
-from navirl_cli.figures.style import house_style
+from navirl_cli.figures.style import house_style, panel_width_in
 from navirl_cli.irl.scene import Scene
 
 #: Free cells without colour are white, so that the likely paths stand out and print well; low numbers are light.
@@ -34,10 +35,18 @@ VISITS_MAP = colormaps["viridis_r"].with_extremes(under="white", bad=(0, 0, 0, 0
 REWARD_MAP = colormaps["cividis"].with_extremes(bad=(0, 0, 0, 0))
 #: Cells with fewer expected visits than this stay white: one path in a thousand passes there.
 LEAST_VISITS = 1e-3
+#: Colours of the reward span its values this near to the nominal path and to people, m: about personal distance (Hall).
+REACH_M = 1.2
 #: Thickness of a colour bar and its distance from the map, in shares of the map's longer side.
 _BAR, _GAP = 0.03, 0.02
 #: A map flatter than this has its colour bar above it, because the label is longer than the map is high.
 _FLAT = 0.5
+#: Width of what stands beside a map and its colour bar, and of a letter of the bar's label, inches.
+_BESIDE_IN, _LETTER_IN = 1.05, 0.056
+#: Letters in a line of the bar's label at least.
+_SHORTEST = 21
+#: Pointed ends of a colour bar, by whether shown cells lie below and above its range.
+_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,9 @@ def draw_reward(
 ) -> DrawnCells:
     """Draw the part of the reward that belongs to the cell (Fig. 8 right).
 
-    Colours span what the window shows, so that far cells of a large map do not wash them out.
+    Colours span the values within REACH_M of the nominal path and of people, so that far corners of the map do not wash
+    them out; the colour bar has a pointed end where shown cells lie beyond. The cost of the way belongs to the move and
+    is not in it.
 
     Args:
         axes: Where to draw.
@@ -122,11 +133,12 @@ def draw_reward(
     """
     _check(scene, reward_by_cell)
     window = _window(scene, scene.nominal) if window_m is None else window_m
-    x, y = scene.lattice.xy_m.T
-    inside = (x > window[0]) & (x < window[1]) & (y > window[2]) & (y < window[3])
-    shown = reward_by_cell[inside] if inside.any() else reward_by_cell
-    image = _draw_cells(axes, scene, reward_by_cell, Normalize(shown.min(), shown.max()), REWARD_MAP)
-    bar = _draw_bar(axes, image, window, "state reward per step", extend="neither")
+    shown = _inside(scene, window)
+    near = shown & _within_reach(scene)
+    spanned, seen = reward_by_cell[near if near.any() else shown], reward_by_cell[shown]
+    image = _draw_cells(axes, scene, reward_by_cell, Normalize(spanned.min(), spanned.max()), REWARD_MAP)
+    ends = bool(seen.min() < spanned.min()), bool(seen.max() > spanned.max())
+    bar = _draw_bar(axes, image, window, "state reward per step (without cost of way)", extend=_EXTEND[ends])
     return _draw_scene(image, bar, scene, window, robot_radius_m, title=title, legend=legend)
 
 
@@ -139,6 +151,21 @@ def _check(scene: Scene, values: FloatArray) -> None:
 def _window(scene: Scene, shown: BoolArray) -> Window:
     """What to show of a scene: its nominal path, the (n,) cells that matter, and the surroundings."""
     return window_around([scene.lattice.grid], scene.lattice.xy_m[shown | scene.nominal])
+
+
+def _inside(scene: Scene, window: Window) -> BoolArray:
+    """(n,) cells that a window shows; all where it shows none."""
+    x, y = scene.lattice.xy_m.T
+    inside: BoolArray = (x > window[0]) & (x < window[1]) & (y > window[2]) & (y < window[3])
+    return inside if inside.any() else np.ones_like(inside)
+
+
+def _within_reach(scene: Scene) -> BoolArray:
+    """(n,) cells within REACH_M of the nominal path or of a person."""
+    near: BoolArray = scene.deviation_m <= REACH_M
+    for person in scene.people_m:
+        near |= np.hypot(*(scene.lattice.xy_m - person).T) <= REACH_M
+    return near
 
 
 def _draw_cells(axes: Axes, scene: Scene, values: FloatArray, norm: Normalize, colours: Colormap) -> AxesImage:
@@ -162,7 +189,8 @@ def _draw_bar(axes: Axes, image: AxesImage, window: Window, label: str, extend: 
     bar = axes.figure.colorbar(
         image, cax=axes.inset_axes(place), orientation="horizontal" if above else "vertical", extend=extend
     )
-    bar.set_label(label)
+    length_in = (panel_width_in(axes) - _BESIDE_IN) * (1.0 if above else shape)
+    bar.set_label(fill(label, max(_SHORTEST, int(length_in / _LETTER_IN))))
     bar.outline.set_linewidth(0.5)
     if isinstance(image.norm, LogNorm):
         bar.formatter = FuncFormatter(lambda value, _: f"{value:g}")
@@ -187,10 +215,10 @@ def _draw_scene(
     axes, ends = image.axes, scene.lattice.xy_m[[scene.start, scene.goal]]
     obstacles = draw_obstacles(axes, scene.lattice.grid)
     nominal = draw_nominal(axes, scene.nominal_line_m())
-    people = draw_people(axes, scene.people_m)
+    people = draw_people(axes, scene.people_m, filled=False)
     _, robots = draw_starts(axes, ends[:1], robot_radius_m)
     draw_goals(axes, ends[1:])
     frame(axes, window, title)
     if legend:
-        legend_below(axes, ground_handles(people, robots, nominal=True))
+        legend_below(axes, ground_handles(people, robots, nominal=True, filled=False))
     return DrawnCells(axes, window, image, obstacles, nominal, people, bar)

@@ -1,6 +1,6 @@
 """What figures of a map share: obstacles, people, start and goal to scale, axes in metres, legend below."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import ceil
 from typing import Any
 
@@ -55,6 +55,15 @@ _GOAL: dict[str, Any] = {
 }
 _NOMINAL: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (4, 2)), "label": "nominal path"}
 _HALO = (withStroke(linewidth=2.2, foreground="white"),)
+#: Outline of a person on a white map, and on colours, where it has to differ from the robot's and hides nothing.
+_PERSON: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 0.8, "zorder": 4}
+_PERSON_ON_COLOURS: dict[str, Any] = {
+    **_PERSON,
+    "linewidth": 1.2,
+    "path_effects": (withStroke(linewidth=2.4, foreground="white"),),
+}
+#: How opaque people are together where all of them overlap.
+_OPACITY = 0.9
 
 
 def window_around(grids: Sequence[Grid], points_m: FloatArray, margin_m: float = MARGIN_M) -> Window:
@@ -62,15 +71,17 @@ def window_around(grids: Sequence[Grid], points_m: FloatArray, margin_m: float =
 
     Args:
         grids: One or several maps in one frame.
-        points_m: (n, 2) m, map frame, what must be seen.
+        points_m: (n, 2) m, map frame, what must be seen as far as it is on the maps: where a point lies beyond them,
+            the window ends with them.
         margin_m: Around the points' bounding box, m.
 
     Returns:
-        Borders in m, within the maps' (and around all points).
+        Borders in m, within the maps'.
     """
     extents = np.array([grid.extent_m for grid in grids])
-    low, high = points_m.min(axis=0), points_m.max(axis=0)
-    first, last = np.minimum(extents[:, ::2].min(axis=0), low), np.maximum(extents[:, 1::2].max(axis=0), high)
+    first, last = extents[:, ::2].min(axis=0), extents[:, 1::2].max(axis=0)
+    seen = np.clip(points_m, first, last)
+    low, high = seen.min(axis=0), seen.max(axis=0)
     near_first, near_last = np.maximum(low - margin_m, first), np.minimum(high + margin_m, last)
     if np.prod(last - first) >= CROP_FROM * np.prod(near_last - near_first):
         first, last = near_first, near_last
@@ -105,16 +116,24 @@ def draw_obstacles(axes: Axes, grid: Grid) -> AxesImage:
     )
 
 
-def draw_people(axes: Axes, people_m: FloatArray) -> list[Circle]:
-    """Draw (p, 2) people, m, map frame, as circles to scale."""
-    opacity = 0.9 if len(people_m) < 5 else 0.45
-    circles = [
-        Circle((x, y), PERSON_RADIUS_M, facecolor=(PERSON_COLOUR, opacity), edgecolor=INK, linewidth=0.8, zorder=4)
-        for x, y in people_m
-    ]
-    for circle in circles:
-        axes.add_patch(circle)
-    return circles
+def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circle]:
+    """Draw (p, 2) people, m, map frame, as circles to scale.
+
+    Filled ones lie below the paths, and are the more translucent the more there are: where people of several trials
+    overlap, all outlines are seen. Others are an outline that hides nothing of the colours below.
+
+    Returns:
+        The outlines.
+    """
+    opacity = 1 - (1 - _OPACITY) ** (1 / max(1, len(people_m)))
+    if filled:
+        for x, y in people_m:
+            axes.add_patch(Circle((x, y), PERSON_RADIUS_M, facecolor=(PERSON_COLOUR, opacity), linewidth=0, zorder=2))
+    look = _PERSON if filled else _PERSON_ON_COLOURS
+    outlines = [Circle((x, y), PERSON_RADIUS_M, **look) for x, y in people_m]
+    for outline in outlines:
+        axes.add_patch(outline)
+    return outlines
 
 
 def draw_starts(axes: Axes, starts_m: FloatArray, robot_radius_m: float | None) -> tuple[Line2D, list[Circle]]:
@@ -164,13 +183,18 @@ def _legend_width_in(labels: Sequence[str], columns: int) -> float:
     return _AROUND_IN + sum(_HANDLE_IN + float(column.max()) for column in split)
 
 
-def ground_handles(people: Iterable[Circle], outlines: Iterable[Circle], *, nominal: bool) -> list[Artist]:
+def ground_handles(
+    people: Sequence[Circle], outlines: Sequence[Circle], *, nominal: bool, filled: bool
+) -> list[Artist]:
     """Legend entries of what is there: obstacles, start, goal, and people, robot and nominal path where drawn."""
     disc: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 7, "markeredgecolor": INK}
     handles: list[Artist] = [Line2D([], [], **_NOMINAL)] if nominal else []
     handles += [Line2D([], [], **_START), Line2D([], [], **_GOAL)]
-    if any(True for _ in outlines):
+    if outlines:
         handles.append(Line2D([], [], label="robot", markerfacecolor="white", markeredgewidth=0.6, **disc))
-    if any(True for _ in people):
-        handles.append(Line2D([], [], label="person", markerfacecolor=PERSON_COLOUR, markeredgewidth=0.8, **disc))
+    if people:
+        label = "person" if len(people) == 1 else f"person ({len(people)} places)"
+        colour, look = (PERSON_COLOUR, _PERSON) if filled else ("none", _PERSON_ON_COLOURS)
+        edge_pt = look["linewidth"]
+        handles.append(Line2D([], [], label=label, markerfacecolor=colour, markeredgewidth=edge_pt, **disc))
     return [*handles, Patch(facecolor=OBSTACLE_COLOUR, label="obstacle, inflated")]

@@ -46,6 +46,7 @@ class DrawnPaths:
     lines: list[Line2D]
     #: One for each interval of contact.
     contacts: list[Line2D]
+    #: Outlines of people, one for each distinct place.
     people: list[Circle]
     #: Outlines of the robot where paths start.
     robots: list[Circle]
@@ -76,7 +77,7 @@ def draw_paths(
         DemonstrationError: There is no demonstration.
     """
     if not demonstrations:
-        raise DemonstrationError("no demonstration to draw: check --condition, --cycle and --only-corrected")
+        raise DemonstrationError("no demonstration to draw")
     grids = _maps(demonstrations)
     obstacles = [draw_obstacles(axes, grid) for grid in grids]
     groups = _by_group(demonstrations)
@@ -85,7 +86,7 @@ def draw_paths(
         for one in members:
             contacts.extend(_contacts(axes, one, colour_of(group)))
             lines.append(_path(axes, one, colour_of(group)))
-    people = draw_people(axes, _distinct(np.concatenate([one.people_m for one in demonstrations])))
+    people = draw_people(axes, _distinct(np.concatenate([one.people_m for one in demonstrations])), filled=True)
     starts = np.array([one.xy_m[0] for one in demonstrations])
     _, robots = draw_starts(axes, starts, max(one.robot_radius_m for one in demonstrations))
     goals = np.unique([one.goal_m for one in demonstrations], axis=0)
@@ -93,8 +94,8 @@ def draw_paths(
     seen = np.concatenate([*(one.xy_m for one in demonstrations), goals])
     frame(axes, window_around(grids, seen) if window_m is None else window_m, title)
     if legend:
-        entries = [*_group_handles(groups, in_contact=bool(contacts)), *ground_handles(people, robots, nominal=False)]
-        legend_below(axes, entries)
+        marks = ground_handles(people, robots, nominal=False, filled=True)
+        legend_below(axes, [*_group_handles(groups, in_contact=bool(contacts)), *marks])
     return DrawnPaths(axes, obstacles, lines, contacts, people, robots)
 
 
