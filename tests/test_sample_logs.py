@@ -12,6 +12,7 @@ from navirl_cli.irl.fit import Status, fit
 from navirl_cli.irl.likelihood import evidence_of, log_likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.logs.load import load_recording
+from navirl_cli.simulation.log import write_log
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 
@@ -105,3 +106,14 @@ def test_learnt_paths_keep_the_demonstrated_distance(second_cycles, pooled):
     rows = {row.kind: row for row in result.groups}
     driven, learnt = rows[DRIVEN], rows[LEARNT]
     assert abs(learnt.mean.min_distance_m - driven.mean.min_distance_m) < driven.std.min_distance_m
+
+
+def test_the_simulation_still_writes_the_sample_logs(pairs, tmp_path):
+    # Not byte for byte: the last digits of a sine differ between machines.
+    write_log(1, 2020, tmp_path / "p01.mcap", force=False)
+    now, then = read_truth(tmp_path / "p01.mcap"), pairs[0][1]
+    assert now.theta == pytest.approx(then.theta, rel=1e-9)
+    for new, old in zip(now.trials, then.trials, strict=True):
+        assert (new.goal_t_ns, new.condition, new.cycle) == (old.goal_t_ns, old.condition, old.cycle)
+        assert new.xy_m == pytest.approx(old.xy_m, abs=0.002)
+        assert new.force_n == pytest.approx(old.force_n, abs=0.1)
