@@ -141,6 +141,9 @@ def test_extract_json_has_numbers(navirl, tmp_path):
         ({"moves": False}, (), "no trial became a demonstration"),
         ({"goals": ()}, (), "no goal is announced, so that trials cannot be split at goals"),
         ({}, ("--person", "0,0.1"), "a person at x 0.00 m, y 0.10 m stands on the path's start"),
+        ({}, ("-o", "/dev/null"), "/dev/null: expected the name of a file to write, found something else"),
+        ({}, ("-o", "x" * 300), "cannot be written: File name too long"),
+        ({}, ("--goal", "50,50"), "goal unreachable: no free way on the map from x"),
         ({}, ("-o", "no/demos.json"), "no/demos.json: expected an existing folder, found none at no; create it"),
     ],
 )
@@ -197,8 +200,29 @@ def test_a_cut_log_gives_what_is_left_with_exit_code_3(navirl, tmp_path):
 def test_a_skipped_trial_is_told_with_exit_code_3(navirl, tmp_path):
     log = log_with(tmp_path, goals=((1.5, 4.0, 0.0), (13.0, 0.0, 0.0)))
     result = navirl("extract", log, "-o", "demos.json", code=3)
-    assert "the trial 13.0 s after its start: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
+    assert "run.mcap: trial 2: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
     assert result.stdout.count("run/") == 1
+
+
+def test_a_missing_log_among_good_ones_and_a_log_given_twice(navirl, tmp_path):
+    good = log_with(tmp_path)
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(good.read_bytes())
+    stderr = navirl("extract", good, "none.mcap", copy, "-o", "demos.json", code=3).stderr
+    assert "left out: none.mcap: cannot be read" in stderr
+    assert "copy.mcap: the same recording as run.mcap" in stderr
+    document = read_json(Path("demos.json"), "demonstrations")
+    assert [source["file"] for source in document["inputs"]] == ["run.mcap"]
+
+
+def test_ids_stay_with_the_trials_when_some_are_skipped_and_notes_name_them(navirl, tmp_path):
+    first = log_with(tmp_path, "a.mcap", goals=((0.2, 4.0, 0.0), (1.5, 0.0, 1.0), (1.9, 4.0, 0.0)))
+    second = log_with(tmp_path, "b.mcap", obstacles=((30, 17),))
+    result = navirl("extract", first, second, "-o", "demos.json", "--participant", "ann", code=3)
+    ids = [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]]
+    assert ids == ["ann/3", "ann/4"]
+    assert "a.mcap: trials 1, 2: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
+    assert "navirl: ann/4: 5 driven cells that the map calls occupied were freed" in result.stderr
 
 
 def test_notes_go_to_stderr(navirl, tmp_path):
@@ -223,10 +247,34 @@ def test_notes_go_to_stderr(navirl, tmp_path):
         ("fit", "demos.json", "-o", "r.json", "--l2", "-1"),
         ("evaluate", "demos.json", "--json", "--csv"),
         ("plot", "nothing", "demos.json"),
+        ("extract", "a.mcap", "-o", "x.json", "--robot-radius", "nan"),
+        ("extract", "a.mcap", "-o", "x.json", "--contact-force", "inf"),
+        ("extract", "a.mcap", "-o", "x.json", "--resolution", "1e-9"),
+        ("extract", "a.mcap", "-o", "x.json", "--goal", "inf,0"),
+        ("fit", "demos.json", "-o", "r.json", "--l2", "inf"),
+        ("fit", "demos.json", "-o", "r.json", "--init", "c0=-50,c0=-60"),
+        ("evaluate", "demos.json", "--seed", "-1"),
+        ("evaluate", "demos.json", "--samples", "1000000000000"),
+        ("simulate", "-o", "x", "--seed", "-1"),
     ],
 )
 def test_wrong_usage_exits_with_2(navirl, words):
     assert "Error:" in navirl(*words, code=2).stderr
+
+
+def test_a_file_without_demonstrations(navirl, work):
+    document = json.loads((work / "demos.json").read_text())
+    document["demonstrations"] = []
+    Path("none.json").write_text(json.dumps(document))
+    reward = ("--reward", work / "reward.json")
+    for words in (
+        ("fit", "none.json", "-o", "r.json"),
+        ("evaluate", "none.json"),
+        ("plot", "paths", "none.json", "-o", "a.png"),
+        ("plot", "policy", "none.json", *reward, "-o", "a.png"),
+        ("plot", "properties", "none.json", "-o", "a.png"),
+    ):
+        assert navirl(*words, code=1).stderr == "navirl: none.json: holds no demonstrations\n"
 
 
 def test_debug_shows_the_traceback(navirl):

@@ -10,9 +10,10 @@ from typing import Any
 
 import click
 
-from navirl_cli.artefacts import Input, read_demonstrations, read_reward_for, write_json
+from navirl_cli.artefacts import Input, read_reward_for, write_json
 from navirl_cli.commands.shared import (
     FilePath,
+    demonstrations_in,
     demos_argument,
     echo_json,
     finish,
@@ -60,7 +61,7 @@ def evaluate(
         raise click.UsageError("--json and --csv exclude each other.")
     if output is not None:
         _check_output(output, force=force)
-    demonstrations = read_demonstrations(demos)
+    demonstrations = demonstrations_in(demos)
     learnt = None if reward is None else read_reward_for(reward, demonstrations).reward
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
@@ -68,15 +69,15 @@ def evaluate(
         )
     inputs = [Input.of(path) for path in (demos, reward) if path is not None]
     document = _document(result, inputs, samples if reward else 0, seed)
-    if as_json:
-        echo_json(document)
-    else:
-        click.echo(_csv(result) if as_csv else _table(result), nl=not as_csv)
     if output is not None and output.suffix == ".json":
         write_json(output, "metrics", document, force=force)
     elif output is not None:
         with replacing(output, force=force) as temporary:
             temporary.write_text(_csv(result), encoding="utf-8", newline="")
+    if as_json:
+        echo_json(document)
+    else:
+        click.echo(_csv(result) if as_csv else _table(result), nl=not as_csv)
     finish(result.notes)
 
 

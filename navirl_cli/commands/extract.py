@@ -11,6 +11,7 @@ import click
 from navirl_cli.artefacts import Input, demonstrations_document, write_json
 from navirl_cli.commands.shared import (
     FilePath,
+    Number,
     Pair,
     Point,
     echo_json,
@@ -45,10 +46,8 @@ from navirl_cli.parallel import map_in_order
     help="Trials start at new goals, at rests, or the log is one trial.",
 )
 @click.option("--participant", help="Name in place of the log's or the file's.")
-@click.option("--robot-radius", default=0.3, show_default=True, type=click.FloatRange(min=0), help="m; grows the map.")
-@click.option(
-    "--resolution", default=0.1, show_default=True, type=click.FloatRange(min=0, min_open=True), help="Cells, m."
-)
+@click.option("--robot-radius", default=0.3, show_default=True, type=Number(0, 10), help="m; grows the map.")
+@click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m.")
 @click.option(
     "--person", "people", multiple=True, type=Point(), help="Where a person stands, m in the map; repeatable."
 )
@@ -57,7 +56,7 @@ from navirl_cli.parallel import map_in_order
     "--contact-force",
     default=3.0,
     show_default=True,
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number(0, 1000, min_open=True),
     help="A contact begins above this force, N, and ends below half of it.",
 )
 @click.option("--topic", "topics", multiple=True, type=Pair(), help="ROLE=/topic where several fit, e.g. wrench=/ft.")
@@ -94,42 +93,50 @@ def extract(
         goal_m=goal,
     )
     good, failed = _all_extracted(logs, settings, dict(topics))
-    demonstrations = numbered(d for result in good for d in result.demonstrations)
-    inputs = [Input.of(log) for log in logs]
-    write_json(output, "demonstrations", demonstrations_document(demonstrations, inputs, asdict(settings)), force=force)
+    demonstrations = numbered(result for _, result in good)
+    document = demonstrations_document(demonstrations, [source for source, _ in good], asdict(settings))
+    write_json(output, "demonstrations", document, force=force)
     rows = [_row(demonstration) for demonstration in demonstrations]
     if as_json:
         echo_json(rows)
     else:
         click.echo(text_table(list(FORMATS), [[_shown(name, row[name]) for name in FORMATS] for row in rows]))
-    for note in (note for result in good for note in result.notes):
-        say(note)
-    finish([*failed, *(line for result in good for line in (*result.damage, *result.skipped))])
+    for _, result in good:
+        for note in result.notes:
+            say(note)
+    for one in demonstrations:
+        for note in one.notes:
+            say(f"{one.id}: {note}")
+    finish([*failed, *(line for _, result in good for line in (*result.damage, *result.skipped))])
 
 
 def _all_extracted(
     logs: tuple[Path, ...], settings: ExtractSettings, topics: dict[str, str]
-) -> tuple[list[Extraction], list[str]]:
+) -> tuple[list[tuple[Input, Extraction]], list[str]]:
     """What came out of each log, and what is wrong with those of which nothing did."""
+    good: dict[str, tuple[Input, Extraction]] = {}
+    failed: list[NavirlError] = []
     work = partial(_extracted, settings=settings, topics=topics)
-    results: list[Extraction | NavirlError] = []
     with progress_bar("extract", len(logs)) as update:
-        for log, result in zip(logs, map_in_order(work, logs), strict=True):
-            results.append(result)
-            update(len(results), log.name)
-    good = [result for result in results if isinstance(result, Extraction)]
-    failed = [result for result in results if isinstance(result, NavirlError)]
+        for number, (log, result) in enumerate(zip(logs, map_in_order(work, logs), strict=True), start=1):
+            if isinstance(result, NavirlError):
+                failed.append(result)
+            elif result[0].sha256 in good:
+                failed.append(DemonstrationError(f"{log}: the same recording as {good[result[0].sha256][0].file}"))
+            else:
+                good[result[0].sha256] = result
+            update(number, log.name)
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
         raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
-    return good, [f"left out: {error}" for error in failed]
+    return list(good.values()), [f"left out: {error}" for error in failed]
 
 
-def _extracted(log: Path, settings: ExtractSettings, topics: dict[str, str]) -> Extraction | NavirlError:
+def _extracted(log: Path, settings: ExtractSettings, topics: dict[str, str]) -> tuple[Input, Extraction] | NavirlError:
     """One log's demonstrations, or why there are none: one bad log must not spoil the others."""
     try:
-        return extract_one(load_recording(log, topics), settings)
+        return Input.of(log), extract_one(load_recording(log, topics), settings)
     except NavirlError as error:
         return error
 

@@ -1,12 +1,14 @@
 """``navirl fit``: demonstrations to a reward."""
 
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 
 import click
 
-from navirl_cli.artefacts import Input, read_demonstrations, read_reward, reward_document, write_json
+from navirl_cli.artefacts import Input, read_reward, reward_document, write_json
 from navirl_cli.commands.shared import (
+    Number,
+    demonstrations_in,
     demos_argument,
     echo_json,
     force_option,
@@ -38,7 +40,7 @@ from navirl_cli.irl.reward import Reward
     "--l2",
     default=PAPER_L2,
     show_default=True,
-    type=click.FloatRange(min=0),
+    type=Number(0, 1e6),
     help="Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p. 0 for none.",
 )
 @click.option(
@@ -69,10 +71,11 @@ def fit(
     the optimum from a trust-region Newton method with several starts, standard errors from the observed information.
     """
     check_writable(output, force=force)
+    earlier = () if "=" in initial or not initial else (Path(initial),)
     start = _start(initial)
     chosen = [
         d
-        for d in read_demonstrations(demos)
+        for d in demonstrations_in(demos)
         if (not conditions or d.condition.value in conditions)
         and (cycle is None or d.cycle == cycle)
         and (d.corrected or not only_corrected)
@@ -81,7 +84,7 @@ def fit(
     resolution = _common_resolution(chosen)
     with progress_bar("fit") as update:
         result = fit_reward(evidence, start, l2, lambda step, value: update(step, f"log-likelihood {value:.3f}"))
-    document = reward_document(result, chosen, [Input.of(demos)], resolution)
+    document = reward_document(result, chosen, [Input.of(path) for path in (demos, *earlier)], resolution)
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
@@ -97,13 +100,16 @@ def _start(initial: str) -> Reward:
         return Reward.named({})
     if "=" not in initial:
         return read_reward(Path(initial)).reward
-    values = {}
+    values: dict[str, float] = {}
     for part in initial.split(","):
         name, _, value = part.partition("=")
         try:
-            values[name.strip()] = float(value)
+            number = float(value)
         except ValueError:
-            raise click.BadParameter(f"expected name=number, found {part!r}", param_hint="--init") from None
+            number = nan
+        if name.strip() in values or not isfinite(number):
+            raise click.BadParameter(f"expected name=number once each, found {part!r}", param_hint="--init")
+        values[name.strip()] = number
     try:
         return Reward.named(values)
     except RewardError as error:
@@ -150,7 +156,7 @@ def _report(result: Fit) -> str:
             f"demonstrations   {result.demonstrations}, {result.steps} steps",
             f"log-likelihood   {result.log_likelihood:.4f} nats, {result.log_likelihood / result.steps:.4f} per step",
             f"  at the start   {result.log_likelihood_initial:.4f}",
-            f"  uniform policy {result.log_likelihood_uniform:.4f} ({gain / result.steps:.4f} per step below)",
+            f"  uniform policy {result.log_likelihood_uniform:.4f} ({gain / result.steps:.4f} per step worse)",
             f"iterations       {result.iterations} ({result.evaluations} evaluations from all starts)",
             f"status           {result.status.value}: {result.status.advice}",
         )

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.artefacts import LearntReward, read_demonstrations, read_reward_for
+from navirl_cli.artefacts import LearntReward, read_reward_for
 from navirl_cli.commands.shared import (
     FilePath,
     Function,
+    demonstrations_in,
     demos_argument,
     force_option,
     output_option,
@@ -114,7 +115,7 @@ def properties(
     from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
 
     check_target(output, force=force)
-    demonstrations = read_demonstrations(demos)
+    demonstrations = demonstrations_in(demos)
     learnt = None if reward is None else read_reward_for(reward, demonstrations)
     bars, width_in = _bars(demonstrations, learnt, samples, seed), PAGE_IN if wide else COLUMN_IN
     figure, axes = new_figure(width_in, height_for(bars, width_in), len(METRICS))
@@ -131,7 +132,7 @@ def _figure(
     from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
 
     check_target(output, force=force)
-    demonstrations = read_demonstrations(demos)
+    demonstrations = demonstrations_in(demos)
     figure, axes = new_figure(PAGE_IN if wide else COLUMN_IN)
     draw(axes, demonstrations)
     save_figure(figure, output, force=force)
@@ -140,8 +141,6 @@ def _figure(
 
 def _chosen(demonstrations: list["Demonstration"], trial: str | None) -> "Demonstration":
     """The demonstration that was asked for."""
-    if not demonstrations:
-        raise DemonstrationError("the file holds no demonstrations: there is no scene to draw")
     if trial is None:
         return demonstrations[0]
     for one in demonstrations:
@@ -153,10 +152,10 @@ def _chosen(demonstrations: list["Demonstration"], trial: str | None) -> "Demons
 def _bars(
     demonstrations: list["Demonstration"], learnt: LearntReward | None, samples: int, seed: int
 ) -> list["PropertyBar"]:
-    """What was driven in every group, and what the policy drives in the groups that it was learnt from."""
+    """What was driven in every group, and in the groups that the policy was learnt from what it drives."""
     import numpy as np
 
-    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, compare, group_of
+    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare, group_of
     from navirl_cli.figures.properties import PropertyBar
 
     with progress_bar("evaluate", len(demonstrations)) as update:
@@ -174,6 +173,9 @@ def _bars(
     for row in result.groups:
         if row.kind == DRIVEN:
             bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
+        elif row.kind == ON_GRID and row.group in taught:
+            # Beside learnt paths, which go from cell to cell, what was driven must go from cell to cell too.
+            bars.append(PropertyBar(f"{row.group}, on grid", row.group, row.mean, row.std, row.count))
         elif row.kind == LEARNT and row.group in taught:
-            bars.append(PropertyBar(f"learnt from {row.group}", LEARNT, row.mean, row.std, row.count))
+            bars.append(PropertyBar(f"{row.group}, learnt", LEARNT, row.mean, row.std, row.count))
     return bars

@@ -4,30 +4,61 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+
+from navirl_cli.artefacts import read_demonstrations
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import DemonstrationError
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 FilePath = click.Path(path_type=Path)
 
 force_option = click.option("--force", is_flag=True, help="Replace existing files.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON in place of the table.")
-seed_option = click.option("--seed", default=0, show_default=True, help="Seed of everything drawn by chance.")
+seed_option = click.option(
+    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of everything drawn by chance."
+)
 samples_option = click.option(
     "--samples",
     default=100,
     show_default=True,
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 100_000),
     help="Paths drawn from the learnt policy for every demonstration.",
 )
 demos_argument = click.argument("demos", type=FilePath)
 
 
+def demonstrations_in(path: Path) -> list[Demonstration]:
+    """The demonstrations of a file that holds some.
+
+    Raises:
+        DemonstrationError: It holds none.
+        ArtefactError: It is no demonstrations file.
+    """
+    demonstrations = read_demonstrations(path)
+    if not demonstrations:
+        raise DemonstrationError(f"{path}: holds no demonstrations")
+    return demonstrations
+
+
 def output_option(what: str, *, required: bool = True) -> Callable[[Function], Function]:
     """``-o/--output`` with its help."""
     return click.option("-o", "--output", type=FilePath, required=required, help=what)
+
+
+class Number(click.FloatRange):
+    """A finite number within bounds: click's own takes nan, which no bound stops."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Parse and check."""
+        number = float(super().convert(value, param, ctx))
+        if not isfinite(number):
+            self.fail(f"expected a finite number, found {value!r}", param, ctx)
+        return number
 
 
 class Point(click.ParamType):  # type: ignore[type-arg]
@@ -41,6 +72,8 @@ class Point(click.ParamType):  # type: ignore[type-arg]
             x, y = (float(part) for part in str(value).split(","))
         except ValueError:
             self.fail(f"expected two numbers of metres as x,y, found {value!r}", param, ctx)
+        if not (isfinite(x) and isfinite(y)):
+            self.fail(f"expected finite numbers, found {value!r}", param, ctx)
         return x, y
 
 
