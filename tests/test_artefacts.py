@@ -10,17 +10,9 @@ import pytest
 from jsonschema import Draft202012Validator
 from robot_log import Run, write_run
 
-from navirl_cli.artefacts import (
-    Input,
-    demonstrations_document,
-    read_demonstrations,
-    read_json,
-    read_reward,
-    read_reward_for,
-    reward_document,
-    schema_path,
-    write_json,
-)
+from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
+from navirl_cli.artefacts.rewards import read_reward, read_reward_for, reward_document
+from navirl_cli.artefacts.store import Input, read_json, schema_path, write_json
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.errors import ArtefactError
 from navirl_cli.irl.fit import fit

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from robot_log import Run, write_run
 
-from navirl_cli.artefacts import read_json
+from navirl_cli.artefacts.store import read_json
 from navirl_cli.cli import COMMANDS, cli
 
 SAMPLES = Path(__file__).parent.parent / "sample_logs"

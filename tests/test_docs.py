@@ -62,6 +62,6 @@ def test_the_demo_runs_what_the_readme_shows():
 
 def test_architecture_names_the_files_that_stand():
     text = (ROOT / "ARCHITECTURE.md").read_text()
-    for path in re.findall(r"`((?:logs|demos|irl|evaluation|figures|simulation|commands)/\w+)", text):
+    for path in re.findall(r"`((?:logs|demos|irl|artefacts|evaluation|figures|simulation|commands)/\w+)", text):
         whole = ROOT / "navirl_cli" / path
         assert whole.is_dir() or whole.with_suffix(".py").exists(), path

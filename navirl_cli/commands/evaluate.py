@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from navirl_cli.artefacts import Input, read_reward_for, write_json
+from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.store import Input, write_json
 from navirl_cli.commands.shared import (
     FilePath,
     demonstrations_in,

@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from navirl_cli.artefacts import Input, demonstrations_document, write_json
+from navirl_cli.artefacts.demonstrations import demonstrations_document
+from navirl_cli.artefacts.store import Input, write_json
 from navirl_cli.commands.shared import (
     FilePath,
     Number,

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.artefacts import Input, read_reward, reward_document, write_json
+from navirl_cli.artefacts.rewards import read_reward, reward_document
+from navirl_cli.artefacts.store import Input, write_json
 from navirl_cli.commands.shared import (
     Number,
     demonstrations_in,

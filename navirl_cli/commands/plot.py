@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.artefacts import LearntReward, read_reward_for
+from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
 from navirl_cli.commands.shared import (
     FilePath,
     Function,

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from navirl_cli.artefacts import read_demonstrations
+from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 

@@ -86,7 +86,9 @@ def recording_notes(recording: Recording, pushes: Pushes, push: PushSettings) ->
 
 
 def people_notes(recording: Recording, people: FloatArray) -> list[str]:
-    """People where none can stand: in a wall, or off the map."""
+    """Nobody there at all, or where none can stand: in a wall, or off the map."""
+    if len(people) == 0:
+        return ["no people in the scene; say where they stand with --person x,y"]
     occupancy = recording.occupancy
     walls = Grid(occupancy.data >= OCCUPIED_FROM, occupancy.resolution_m, occupancy.origin_m)
     inside, blocked = walls.contains(walls.cells_of(people)), walls.is_occupied(walls.cells_of(people))

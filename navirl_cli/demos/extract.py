@@ -9,7 +9,7 @@ import numpy as np
 from navirl_cli.demos.checks import check_cells, check_gaps, check_goal, check_start, people_notes, recording_notes
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid, grid_from_occupancy
+from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
 from navirl_cli.demos.rasterize import rasterize
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Split, Trial, trials_of
 from navirl_cli.errors import DemonstrationError, NavirlError
@@ -140,16 +140,8 @@ def _demonstration(
     cells = rasterize(xy, grid)
     free = grid.freed(cells)
     check_cells(cells, xy, grid, settings.robot_radius_m)
-    notes = []
     if not trial.arrived:
         check_goal(free, xy[0], goal)
-        notes.append(f"ended {np.hypot(*(xy[-1] - goal)):.2f} m from its goal; its last cell stands for the goal")
-    blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
-    if blocked:
-        notes.append(f"{blocked} driven cells that the map calls occupied were freed")
-    notes += people_notes(recording, people)
-    if len(people) == 0:
-        notes.append("no people in the scene; say where they stand with --person x,y")
     contacts = contacts_within(pushes, int(t_ns[0]), int(t_ns[-1]))
     steered = _steered_s(recording, int(t_ns[0]), int(t_ns[-1])) > STEERED_S
     declared = _declared(recording, int(t_ns[0]), int(t_ns[-1]))
@@ -172,8 +164,19 @@ def _demonstration(
         grid=free,
         cells=cells,
         log=recording.log,
-        notes=tuple(notes),
+        notes=(*_path_notes(trial, cells, grid, float(np.hypot(*(xy[-1] - goal)))), *people_notes(recording, people)),
     )
+
+
+def _path_notes(trial: Trial, cells: IntArray, grid: Grid, from_goal_m: float) -> list[str]:
+    """What is odd about where a trial led."""
+    notes = []
+    if not trial.arrived:
+        notes.append(f"ended {from_goal_m:.2f} m from its goal; its last cell stands for the goal")
+    blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
+    if blocked:
+        notes.append(f"{blocked} driven cells that the map calls occupied were freed")
+    return notes
 
 
 def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> FloatArray:

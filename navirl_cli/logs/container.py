@@ -7,6 +7,7 @@ is not, each chunk is decompressed and walked. What cannot be read is noted as `
 
 from bisect import bisect_right
 from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -57,14 +58,13 @@ class LogFile:
         self.position = 0
         self._decompressor = Decompressor()
         self._order = 0
-        try:
+        with ExitStack() as on_failure:
+            on_failure.callback(self._file.close)
             self.profile, self.library, self._data_start = self._header()
             self._footer = read_footer(self._file, self.size)
             #: The summary section, None if there is none or it is damaged.
             self.summary = self._footer and read_summary(self._file, self.size, self._data_start, self._footer)
-        except BaseException:
-            self._file.close()
-            raise
+            on_failure.pop_all()
         summary = self.summary or Summary()
         self._definitions = Definitions(dict(summary.schemas), dict(summary.channels))
         self._indexes = summary.chunks

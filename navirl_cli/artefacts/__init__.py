@@ -1,0 +1,1 @@
+"""What navirl writes and reads back: demonstrations, rewards, metrics."""

@@ -1,0 +1,138 @@
+"""Demonstrations as a file."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
+from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.errors import ArtefactError, NavirlError
+
+#: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
+DECIMALS = 6
+
+
+def demonstrations_document(
+    demonstrations: Sequence[Demonstration], inputs: Sequence[Input], settings: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Demonstrations as the content of a demonstrations file."""
+    grids = {demonstration.grid.digest: demonstration.grid for demonstration in demonstrations}
+    return {
+        "inputs": [vars(one) for one in inputs],
+        "settings": dict(settings),
+        "maps": {
+            digest: {
+                "resolution_m": grid.resolution_m,
+                "origin_m": list(grid.origin_m),
+                "rows": ["".join(row) for row in np.where(grid.occupied, "#", ".")],
+            }
+            for digest, grid in grids.items()
+        },
+        "demonstrations": [_written(demonstration) for demonstration in demonstrations],
+    }
+
+
+def read_demonstrations(path: Path) -> list[Demonstration]:
+    """Demonstrations of a file.
+
+    Raises:
+        ArtefactError: As in :func:`read_json`, or a demonstration contradicts itself.
+    """
+    document = read_json(path, "demonstrations")
+    try:
+        grids = {digest: _grid(content) for digest, content in document["maps"].items()}
+        found = [_read(content, grids) for content in document["demonstrations"]]
+    except (NavirlError, ValueError, TypeError, KeyError, OverflowError) as error:
+        raise ArtefactError(f"{path}: {error}") from error
+    twice = [name for name, count in Counter(one.id for one in found).items() if count > 1]
+    if twice:
+        raise ArtefactError(f"{path}: two demonstrations are called {twice[0]}; ids must be unique")
+    return found
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    return [float(value) for value in np.round(values, DECIMALS)]
+
+
+def _written(demonstration: Demonstration) -> dict[str, Any]:
+    """One demonstration as JSON."""
+    d = demonstration
+    return {
+        "id": d.id,
+        "participant": d.participant,
+        "condition": d.condition.value,
+        "corrected": d.corrected,
+        "cycle": d.cycle,
+        "log": d.log,
+        "start_ns": d.start_ns,
+        "t_s": [round(float(t), 9) for t in d.t_s],
+        "x_m": _rounded(d.xy_m[:, 0]),
+        "y_m": _rounded(d.xy_m[:, 1]),
+        "yaw_rad": _rounded(d.yaw_rad),
+        "force_x_n": None if d.force_n is None else _rounded(d.force_n[:, 0]),
+        "force_y_n": None if d.force_n is None else _rounded(d.force_n[:, 1]),
+        "contacts": [
+            {
+                "start_s": round(contact.start_s, DECIMALS),
+                "end_s": round(contact.end_s, DECIMALS),
+                "peak_n": round(contact.peak_n, DECIMALS),
+                "impulse_ns": _rounded(np.array(contact.impulse_ns)),
+            }
+            for contact in d.contacts
+        ],
+        "goal_m": _rounded(np.array(d.goal_m)),
+        "people_m": [_rounded(person) for person in d.people_m],
+        "robot_radius_m": d.robot_radius_m,
+        "map": d.grid.digest,
+        "cells": d.cells.tolist(),
+        "notes": list(d.notes),
+    }
+
+
+def _grid(content: Mapping[str, Any]) -> Grid:
+    """A map of a demonstrations file."""
+    rows = content["rows"]
+    if len({len(row) for row in rows}) != 1:
+        raise ValueError("a map's rows differ in length")
+    occupied = np.array([list(row) for row in rows]) == "#"
+    x, y = content["origin_m"]
+    return Grid(occupied, float(content["resolution_m"]), (float(x), float(y)))
+
+
+def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstration:
+    """One demonstration of a demonstrations file."""
+    name = content["id"]
+    if content["map"] not in grids:
+        raise ValueError(f"demonstration {name}: its map {content['map']!r} is not in the file")
+    try:
+        x, y, force_x, force_y = (content[key] for key in ("x_m", "y_m", "force_x_n", "force_y_n"))
+        forceless = force_x is None or force_y is None
+        return Demonstration(
+            id=name,
+            participant=content["participant"],
+            condition=Condition(content["condition"]),
+            corrected=content["corrected"],
+            cycle=content["cycle"],
+            start_ns=content["start_ns"],
+            t_s=np.array(content["t_s"], dtype=float),
+            xy_m=np.stack([np.array(x, dtype=float), np.array(y, dtype=float)], axis=1),
+            yaw_rad=np.array(content["yaw_rad"], dtype=float),
+            force_n=None if forceless else np.stack([np.array(force_x, float), np.array(force_y, float)], axis=1),
+            contacts=tuple(
+                Contact(c["start_s"], c["end_s"], c["peak_n"], (c["impulse_ns"][0], c["impulse_ns"][1]))
+                for c in content["contacts"]
+            ),
+            goal_m=(content["goal_m"][0], content["goal_m"][1]),
+            people_m=np.array(content["people_m"], dtype=float).reshape(-1, 2),
+            robot_radius_m=content["robot_radius_m"],
+            grid=grids[content["map"]],
+            cells=np.array(content["cells"], dtype=np.int64),
+            log=content["log"],
+            notes=tuple(content["notes"]),
+        )
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ValueError(f"demonstration {name}: {error}") from error
