@@ -35,7 +35,7 @@ def test_a_log_holds_what_a_robot_would_have_recorded(written):
     seconds = (times[-1] - times[0]) / 1e9
     rates = {topic: count / seconds for topic, (_, count) in topics.items()}
     assert rates["/wrench"] == pytest.approx(100, rel=0.01)
-    assert rates["/odom"] == pytest.approx(30, rel=0.15)
+    assert rates["/odom"] == pytest.approx(30, rel=0.01)
     assert rates["/joy"] == pytest.approx(20, rel=0.01)
     assert {topic: name for topic, (name, _) in topics.items()} == {
         "/wrench": "geometry_msgs/msg/WrenchStamped",

@@ -111,7 +111,7 @@ def _write(
     _write_odometry(writer, odometry, received)
     _write_transforms(writer, correction, odometry, received)
     joy = message_type("sensor_msgs/msg/Joy")
-    for step in range(0, line.steps, sensors.STICK_EVERY):
+    for step in sensors.steps_at(sensors.STICK_HZ, line.steps):
         axes = np.round(np.clip(stick[step], -1, 1), 3).astype(np.float32)
         message = joy(header(t_ns[step], "joy"), axes, np.zeros(2, dtype=np.int32))
         writer.message("/joy", message, received.at(step))
@@ -133,9 +133,9 @@ class _Clock:
     def at(self, step: int) -> int:
         return int(self._received[step])
 
-    def every(self, stride: int) -> tuple[IntArray, IntArray]:
+    def at_steps(self, steps: IntArray) -> tuple[IntArray, IntArray]:
         """Measured and received, ns."""
-        return self.t_ns[::stride], self._received[::stride]
+        return self.t_ns[steps], self._received[steps]
 
 
 def _pose(x: float, y: float, yaw: float) -> Any:
@@ -168,7 +168,7 @@ def _write_scene(writer: LogWriter, session: protocol.Session, clock: _Clock) ->
     writer.message("/tf_static", message_type("tf2_msgs/msg/TFMessage")([mounted]), clock.at(0))
     x, y = session.hallway.person_m
     people = message_type("geometry_msgs/msg/PoseArray")
-    for step in range(0, len(clock.t_ns), 50):
+    for step in sensors.steps_at(sensors.PEOPLE_HZ, len(clock.t_ns)):
         writer.message("/people", people(header(clock.t_ns[step], "map"), [_pose(x, y, np.pi)]), clock.at(step))
 
 
@@ -186,9 +186,9 @@ def _write_wrench(writer: LogWriter, measured: tuple[FloatArray, FloatArray], cl
     vector = message_type("geometry_msgs/msg/Vector3")
     wrench = message_type("geometry_msgs/msg/Wrench")(vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
     template = message_type("geometry_msgs/msg/WrenchStamped")(header(0, "ft_sensor"), wrench)
-    stamps, received = clock.every(sensors.WRENCH_EVERY)
+    stamps, received = clock.at_steps(np.arange(len(clock.t_ns)))
     columns = {
-        f"wrench.{part}.{axis}": values[:: sensors.WRENCH_EVERY, i]
+        f"wrench.{part}.{axis}": values[:, i]
         for part, values in zip(("force", "torque"), measured, strict=True)
         for i, axis in enumerate("xyz")
     }
@@ -206,9 +206,9 @@ def _write_odometry(writer: LogWriter, odometry: sensors.Poses, clock: _Clock) -
         message_type("geometry_msgs/msg/PoseWithCovariance")(_pose(0, 0, 0), covariance),
         message_type("geometry_msgs/msg/TwistWithCovariance")(twist, covariance),
     )
-    stamps, received = clock.every(sensors.ODOMETRY_EVERY)
-    seen = odometry.at(slice(None, None, sensors.ODOMETRY_EVERY))
-    velocity = np.gradient(odometry.xy_m, STEP_S, axis=0)[:: sensors.ODOMETRY_EVERY]
+    steps = sensors.steps_at(sensors.ODOMETRY_HZ, len(clock.t_ns))
+    stamps, received = clock.at_steps(steps)
+    seen, velocity = odometry.at(steps), np.gradient(odometry.xy_m, STEP_S, axis=0)[steps]
     cos, sin = np.cos(seen.yaw_rad), np.sin(seen.yaw_rad)
     columns = {
         "header.stamp": stamps,
@@ -225,7 +225,7 @@ def _write_odometry(writer: LogWriter, odometry: sensors.Poses, clock: _Clock) -
 def _write_transforms(writer: LogWriter, correction: sensors.Poses, odometry: sensors.Poses, clock: _Clock) -> None:
     """map -> odom from the localisation, odom -> base_link from the wheels."""
     tf = message_type("tf2_msgs/msg/TFMessage")
-    for step in range(0, len(clock.t_ns), sensors.TRANSFORM_EVERY):
+    for step in sensors.steps_at(sensors.TRANSFORM_HZ, len(clock.t_ns)):
         both = []
         for parent, child, poses in (("map", "odom", correction), ("odom", "base_link", odometry)):
             half = poses.yaw_rad[step] / 2

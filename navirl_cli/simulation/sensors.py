@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.simulation.driving import STEP_S
 
-WRENCH_EVERY, ODOMETRY_EVERY, TRANSFORM_EVERY, STICK_EVERY = 1, 3, 10, 5  # of 100 Hz: 100, 33, 10, 20 Hz
+#: Messages a second; the wrench comes with every step, at 100 Hz.
+ODOMETRY_HZ, TRANSFORM_HZ, STICK_HZ, PEOPLE_HZ = 30.0, 10.0, 20.0, 2.0
 FORCE_NOISE_N, TORQUE_NOISE_NM = 0.25, 0.01
 #: Steps of the converter.
 FORCE_STEP_N, TORQUE_STEP_NM = 1 / 32, 1 / 512
@@ -38,9 +39,15 @@ class Poses:
         """The frames of these poses' reference, seen from the poses."""
         return Poses(_turned(-self.xy_m, -self.yaw_rad), -self.yaw_rad)
 
-    def at(self, index: IntArray | slice) -> "Poses":
+    def at(self, index: IntArray) -> "Poses":
         """Some of the poses."""
         return Poses(self.xy_m[index], self.yaw_rad[index])
+
+
+def steps_at(rate_hz: float, count: int) -> IntArray:
+    """The steps, of so many, that fall nearest to the ticks of a rate."""
+    ticks = np.arange(0, count - 1, 1 / (rate_hz * STEP_S))
+    return np.round(ticks).astype(np.int64)
 
 
 def heading_of(count: int, rng: np.random.Generator) -> FloatArray:
