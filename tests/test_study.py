@@ -74,7 +74,7 @@ def test_poses_become_the_published_cells(study, run):
 
 @needs_study
 def test_a_fit_climbs_past_the_bound_at_which_plain_newton_sticks(study):
-    # MODEL.md, trap 5: from the study's start run 3930 sticks at a_g = 0, about 20 nats below the optimum.
+    # From the study's start run 3930 sticks at a_g = 0, about 20 nats below the optimum.
     demonstrated = evidence(study["3930"]["force_demos/passing_1"] + study["3930"]["force_demos/passing_2"])
     start = Reward.named(EXPECTED["theta_study_initial_si"])
     found = fit(demonstrated, start)

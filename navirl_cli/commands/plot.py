@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
     from navirl_cli.evaluation.compare import Comparison
     from navirl_cli.figures.properties import PropertyBar
+    from navirl_cli.irl.scene import Scene
 
 
 def figure_options(function: Function) -> Function:
@@ -69,11 +70,9 @@ def policy(demos: Path, output: Path, wide: bool, force: bool, reward: Path, tri
 
         from navirl_cli.figures.cells import draw_policy
         from navirl_cli.irl.likelihood import policy_of
-        from navirl_cli.irl.scene import scenes_of
 
         learnt = read_reward_for(reward, demonstrations).reward
-        one = _chosen(demonstrations, trial)
-        scene = scenes_of([one])[0]
+        one, scene = _chosen(demonstrations, trial)
         start = np.zeros(scene.lattice.size)
         start[scene.start] = 1.0
         draw_policy(axes[0], scene, policy_of(learnt, scene).visits(start), robot_radius_m=one.robot_radius_m)
@@ -90,11 +89,9 @@ def reward_(demos: Path, output: Path, wide: bool, force: bool, reward: Path, tr
 
     def draw(axes: Any, demonstrations: list["Demonstration"]) -> None:
         from navirl_cli.figures.cells import draw_reward
-        from navirl_cli.irl.scene import scenes_of
 
         learnt = read_reward_for(reward, demonstrations).reward
-        one = _chosen(demonstrations, trial)
-        scene = scenes_of([one])[0]
+        one, scene = _chosen(demonstrations, trial)
         draw_reward(axes[0], scene, learnt.by_cell(scene), robot_radius_m=one.robot_radius_m)
 
     _figure(demos, output, draw, wide=wide, force=force)
@@ -139,13 +136,13 @@ def _figure(
     click.echo(output)
 
 
-def _chosen(demonstrations: list["Demonstration"], trial: str | None) -> "Demonstration":
-    """The demonstration that was asked for."""
-    if trial is None:
-        return demonstrations[0]
+def _chosen(demonstrations: list["Demonstration"], trial: str | None) -> tuple["Demonstration", "Scene"]:
+    """The demonstration that was asked for, and its scene."""
+    from navirl_cli.irl.scene import scenes_of
+
     for one in demonstrations:
-        if one.id == trial:
-            return one
+        if trial in {None, one.id}:
+            return one, scenes_of([one])[0]
     raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
 
 

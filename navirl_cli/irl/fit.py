@@ -122,16 +122,14 @@ def fit(
         if progress is not None:
             progress(steps, point.value)
 
-    best: Maximum | None = None
-    evaluations = 0
-    for start in starts:
-        # What the data do not tell stays where it was given: elsewhere the regulariser alone would choose.
-        found = maximise(problem, np.where(identified, start, at_start.x), lower, upper, identified, count)
-        evaluations += found.evaluations
-        if best is None or found.best.value > best.best.value + 1e-9:
-            best = found
-    if best is None:
-        raise RewardError("no start at which the partition function is finite")
+    # What the data do not tell stays where it was given: elsewhere the regulariser alone would choose.
+    found = [
+        maximise(problem, np.where(identified, start, at_start.x), lower, upper, identified, count) for start in starts
+    ]
+    # Of maxima that differ by rounding the first: that of the given start.
+    top = max(maximum.best.value for maximum in found)
+    best = next(maximum for maximum in found if maximum.best.value >= top - 1e-9)
+    evaluations = len(starts) + sum(maximum.evaluations for maximum in found)
     return problem.result(best, identified, (lower, upper), at_start, evaluations)
 
 
@@ -145,9 +143,11 @@ class _Problem:
 
     @property
     def scale(self) -> FloatArray:
+        """(k,) scales of the parameters."""
         return np.array([parameter.scale for parameter in self.initial.parameters])
 
     def to_units(self, theta: Sequence[float]) -> FloatArray:
+        """(k,) parameters divided by their scales."""
         return np.asarray(theta, dtype=float) / self.scale
 
     def __call__(self, x: FloatArray) -> Point:
@@ -182,14 +182,13 @@ class _Problem:
         return told
 
     def starts(self, first: Point) -> list[FloatArray]:
-        """The given start, and others: from the study's, Newton's method alone sticks at a_g = 0 on some data."""
-        parameters = self.initial.parameters
+        """The given start, and others with the restarts of those parameters that have some."""
         starts = [first.x]
-        for factors in ({"a_g": -1.0, "sigma_p": 1.0}, {"a_g": -2.0, "sigma_p": 8.0}):
+        for number in range(max(len(parameter.restarts) for parameter in self.initial.parameters)):
             x = first.x.copy()
-            for j, parameter in enumerate(parameters):
-                if parameter.name in factors:
-                    x[j] = factors[parameter.name] / parameter.scale
+            for j, parameter in enumerate(self.initial.parameters):
+                if number < len(parameter.restarts):
+                    x[j] = parameter.restarts[number] / parameter.scale
             if (x != first.x).any():
                 starts.append(x)
         return starts

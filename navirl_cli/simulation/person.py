@@ -12,7 +12,7 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Path
 from navirl_cli.simulation.hallway import PERSON_RADIUS_M, ROBOT_RADIUS_M
 
-#: The published parameters of all participants, in SI units (MODEL: c0, a_g, a_p, sigma_p), and how people scatter.
+#: The published parameters of all participants, in SI units (c0, a_g, a_p, sigma_p), and how people scatter.
 PUBLISHED = (-54.12586, -0.873514, -4.907188, 1.679499)
 SCATTER = (0.10, 0.25, 0.25, 0.20)
 #: Reaction time, s; time in which a force builds up, s.

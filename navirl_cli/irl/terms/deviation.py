@@ -10,7 +10,16 @@ class Deviation:
     """Each step costs the squared distance of its cell to the nominal path."""
 
     parameters = (
-        Parameter("a_g", "1/m^2", -1e4, 0.0, 1.0, -0.01, "reward per step and squared metre from the nominal path"),
+        Parameter(
+            "a_g",
+            "1/m^2",
+            -1e4,
+            0.0,
+            1.0,
+            -0.01,
+            "reward per step and squared metre from the nominal path",
+            restarts=(-1.0, -2.0),  # from the study's start Newton's method alone sticks at 0 on some of its data
+        ),
     )
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:

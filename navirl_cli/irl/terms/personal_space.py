@@ -13,7 +13,16 @@ class PersonalSpace:
 
     parameters = (
         Parameter("a_p", "", -1e4, 1e4, 1.0, -5.0, "reward per step at a person's place"),
-        Parameter("sigma_p", "1/m^2", 1e-3, 1e3, 1.0, 2.0, "decay of the personal space with squared distance"),
+        Parameter(
+            "sigma_p",
+            "1/m^2",
+            1e-3,
+            1e3,
+            1.0,
+            2.0,
+            "decay of the personal space with squared distance",
+            restarts=(1.0, 8.0),  # a wide space and a narrow one
+        ),
     )
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:

@@ -23,6 +23,8 @@ class Parameter:
     #: Where a fit starts when nothing else is said (the study's initial values).
     initial: float
     meaning: str
+    #: Where a fit starts again: the likelihood may have more than one slope in this parameter.
+    restarts: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
