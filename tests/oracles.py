@@ -6,8 +6,9 @@ the package; arrays by move follow MOVES.
 
 import heapq
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from itertools import pairwise
-from math import exp, hypot, log, sqrt
+from math import ceil, exp, floor, hypot, inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,6 +246,87 @@ def rasterised(line_cells: FloatArray) -> list[Cell]:
         path.append(cell)
         assert len(path) < 10_000, "the rule walks in circles"
     return path
+
+
+def passed_cells(line_cells: FloatArray, *, arms: bool) -> list[tuple[Cell, float]]:
+    """What an (n, 2) line in units of cells passes, in exact fractions: cell (c, r) reaches from (c, r) to (c+1, r+1).
+
+    Either every cell with the length of the line in it, or, of the crosses through the cells' centres, each arm that
+    the line crosses, with how much nearer to the centre than to the arm's end (half a cell away) that is.
+    """
+    passed = []
+    for start, end in pairwise([tuple(map(Fraction, point)) for point in line_cells.tolist()]):
+        along = [b - a for a, b in zip(start, end, strict=True)]
+        shares = {}
+        for axis in (0, 1):
+            low, high = sorted((start[axis], end[axis]))
+            for line in range(floor(low) - 1, floor(high) + 2):
+                at = line + Fraction(1, 2) * arms
+                if along[axis] != 0 and low <= at <= high:
+                    shares[(at - start[axis]) / along[axis]] = axis
+        if arms:
+            for share, axis in sorted(shares.items()):
+                point = [a + share * b for a, b in zip(start, along, strict=True)]
+                cell = [floor(v) for v in point]
+                off = point[1 - axis] - cell[1 - axis] - Fraction(1, 2)
+                passed.append(((cell[0], cell[1]), float(Fraction(1, 2) - abs(off))))
+        else:
+            for one, other in pairwise(sorted({Fraction(0), Fraction(1), *shares})):
+                x, y = (a + (one + other) / 2 * b for a, b in zip(start, along, strict=True))
+                passed.append(((floor(x), floor(y)), float(other - one) * hypot(*map(float, along))))
+    return passed
+
+
+def without_spare_cells(passed: list[tuple[Cell, float]], first: Cell, last: Cell, apart: int) -> list[Cell]:
+    """Take the least cell out of those whose neighbours in the path are at most so far apart, again and again.
+
+    For lines that are not made to touch corners and borders, where cells would weigh nothing or the same.
+    """
+    path = [[first, inf], *([cell, weight] for cell, weight in passed), [last, inf]]
+    while True:
+        for i in range(len(path) - 1, 0, -1):
+            if path[i][0] == path[i - 1][0]:
+                path[i - 1][1] += path.pop(i)[1]
+        spare = [
+            i
+            for i in range(1, len(path) - 1)
+            if max(abs(a - b) for a, b in zip(path[i - 1][0], path[i + 1][0], strict=True)) <= apart
+        ]
+        if not spare:
+            return [cell for cell, _ in path]
+        path.pop(min(spare, key=lambda i: path[i][1]))
+
+
+def nearest_times(
+    line_m: FloatArray, t_s: FloatArray, centres_m: FloatArray, piece_m: float
+) -> tuple[list[float], float]:
+    """Times in order at which a line is nearest to points, as a sum of squared distances, and that sum.
+
+    The line is looked at in pieces; the first point has the line's first time, the last point its last.
+    """
+    places = [(float(t_s[0]), *map(float, line_m[0]))]
+    for (x0, y0), (x1, y1), t0, t1 in zip(line_m[:-1], line_m[1:], t_s[:-1], t_s[1:], strict=True):
+        pieces = max(1, ceil(hypot(x1 - x0, y1 - y0) / piece_m))
+        places += [
+            (t0 + (t1 - t0) * i / pieces, x0 + (x1 - x0) * i / pieces, y0 + (y1 - y0) * i / pieces)
+            for i in range(1, pieces + 1)
+        ]
+    # By point: for every place the least sum with this point there, and the place of the point before.
+    sums = [0.0 if i == 0 else inf for i in range(len(places))]
+    origins = []
+    for cx, cy in centres_m[1:]:
+        least, origin, now, came = inf, 0, [], []
+        for i, (_, x, y) in enumerate(places):
+            if sums[i] < least:
+                least, origin = sums[i], i
+            now.append(least + (x - cx) ** 2 + (y - cy) ** 2)
+            came.append(origin)
+        sums = now
+        origins.append(came)
+    at = [len(places) - 1]
+    for came in reversed(origins):
+        at.append(came[at[-1]])
+    return [places[i][0] for i in reversed(at)], sums[-1]
 
 
 def area_by_raster(line_m: FloatArray, nominal_m: FloatArray, cell_m: float) -> float:

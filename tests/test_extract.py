@@ -10,6 +10,7 @@ from robot_log import DRIVE_S, LENGTH_M, PUSH_N, PUSH_S, STAND_S, START_NS, Run,
 from navirl_cli.demos.contact import PushSettings, hysteresis, pushes_of, quiet_bias
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings, extract, numbered
+from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split, trials_of
 from navirl_cli.errors import DemonstrationError, LogError
 from navirl_cli.logs.load import load_recording
@@ -181,12 +182,15 @@ def test_driven_cells_that_the_map_calls_occupied_are_freed_and_counted(make):
 def test_a_loop_that_the_rule_cuts_off_is_told(make):
     recording = make()
     turn = np.linspace(0, 2 * np.pi, 60)
-    loop = np.stack([2 + 0.8 * np.sin(turn), 0.8 - 0.8 * np.cos(turn)], axis=1)
+    loop = np.stack([2 + 0.7 * np.sin(turn), 0.7 - 0.7 * np.cos(turn)], axis=1)
     way = np.concatenate([recording.xy_m[60:210], loop, recording.xy_m[210:]])
     times = recording.t_ns[0] + np.arange(len(way)) * 33_000_000
     changed = replace(recording, t_ns=times, xy_m=way, yaw_rad=np.zeros(len(way)), goal_t_ns=times[:1])
-    with pytest.raises(DemonstrationError, match=r"9\.0 m driven become 41 cells: the way crosses itself"):
+    with pytest.raises(DemonstrationError, match=r"8\.4 m driven become 41 cells: the way crosses itself"):
         extract(changed, ExtractSettings())
+    kept = one(changed, rasterizer=Rule.CHAIN)
+    assert kept.notes == ()
+    assert len(kept.cells) == pytest.approx(41 + 2 * np.pi * 7 * 0.9, abs=3)  # a circle has fewer steps than its length
     shaking = recording.xy_m + np.random.default_rng(0).normal(0, 0.004, recording.xy_m.shape)
     assert one(replace(recording, xy_m=shaking)).notes == ()
 

@@ -29,6 +29,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
 from navirl_cli.demos.extract import extract as extract_one
 from navirl_cli.demos.lines import path_length_m
+from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import DemonstrationError, NavirlError
 from navirl_cli.files import check_writable
@@ -50,6 +51,13 @@ from navirl_cli.parallel import map_in_order
 @click.option("--robot-radius", default=0.3, show_default=True, type=Number(0, 10), help="m; grows the map.")
 @click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m.")
 @click.option(
+    "--rasterizer",
+    type=click.Choice([rule.value for rule in Rule]),
+    default=ExtractSettings.rasterizer.value,
+    show_default=True,
+    help="How a path becomes cells: the study's rule, the cells crossed, or the chain code.",
+)
+@click.option(
     "--person", "people", multiple=True, type=Point(), help="Where a person stands, m in the map; repeatable."
 )
 @click.option("--goal", type=Point(), help="The goal, m in the map, in place of the log's goals.")
@@ -70,6 +78,7 @@ def extract(
     participant: str | None,
     robot_radius: float,
     resolution: float,
+    rasterizer: str,
     people: tuple[tuple[float, float], ...],
     goal: tuple[float, float] | None,
     contact_force: float,
@@ -88,6 +97,7 @@ def extract(
         split=Split(split),
         resolution_m=resolution,
         robot_radius_m=robot_radius,
+        rasterizer=Rule(rasterizer),
         push=PushSettings(begins_n=contact_force),
         participant=participant,
         people_m=people or None,

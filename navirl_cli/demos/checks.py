@@ -30,7 +30,7 @@ def check_cells(cells: IntArray, xy_m: FloatArray, grid: Grid, robot_radius_m: f
     if path_length_m(grid.centres_of(cells)) < LOOPS * path_length_m(thinned(xy_m, grid.resolution_m)):
         raise DemonstrationError(
             f"{path_length_m(xy_m):.1f} m driven become {len(cells)} cells: the way crosses itself, and the rule from "
-            "poses to cells cuts loops off; split the log into trials that do not"
+            "poses to cells cuts loops off; split the log into trials that do not, or try --rasterizer chain"
         )
 
 

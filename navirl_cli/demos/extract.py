@@ -10,7 +10,7 @@ from navirl_cli.demos.checks import check_cells, check_gaps, check_goal, check_s
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
-from navirl_cli.demos.rasterize import rasterize
+from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Split, Trial, trials_of
 from navirl_cli.errors import DemonstrationError, NavirlError
 from navirl_cli.logs.recording import Declared, Recording
@@ -27,6 +27,7 @@ class ExtractSettings:
     split: Split = Split.GOAL
     resolution_m: float = 0.1
     robot_radius_m: float = 0.3
+    rasterizer: Rule = Rule.STUDY
     push: PushSettings = field(default_factory=PushSettings)
     participant: str | None = None
     #: (x, y) m, map frame, each: in place of the log's people.
@@ -137,7 +138,7 @@ def _demonstration(
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
     people = _people(recording, settings, t_ns[0], t_ns[-1])
     check_start(people, xy[0], settings.robot_radius_m)
-    cells = rasterize(xy, grid)
+    cells = rasterize(xy, grid, settings.rasterizer)
     free = grid.freed(cells)
     check_cells(cells, xy, grid, settings.robot_radius_m)
     if not trial.arrived:

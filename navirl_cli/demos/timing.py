@@ -1,0 +1,78 @@
+"""When a robot was in each cell of its path, and which steps it took while a person pushed it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.errors import DemonstrationError
+
+#: The driven line is looked at in pieces no longer than this share of a cell.
+PIECE = 1 / 16
+
+
+def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid) -> FloatArray:
+    """The times at which a driven line is nearest to the cells of its path.
+
+    Of all times in order, those for which the sum of squared distances between the line and the cells' centres is
+    least: each cell's own nearest point where these are in order, as they are but for corners; where the way crosses
+    itself each cell has the pass that fits its neighbours.
+
+    Args:
+        xy_m: (n, 2) m, map frame.
+        t_s: (n,) s, increasing.
+        cells: (k, 2) column and row along the line, by whatever rule.
+        grid: Gives the cells.
+
+    Returns:
+        (k,) s, non-decreasing, from the first pose's time to the last pose's; to about a sixteenth of a cell's way.
+
+    Raises:
+        DemonstrationError: There are not at least two poses with their times, and two cells.
+    """
+    if len(xy_m) < 2 or len(cells) < 2 or t_s.shape != xy_m.shape[:1]:
+        raise DemonstrationError(
+            f"times of cells need at least two poses, as many times, and two cells; "
+            f"found {len(xy_m)}, {len(t_s)} and {len(cells)}"
+        )
+    line, times = _divided(xy_m, t_s, PIECE * grid.resolution_m)
+    centres = grid.centres_of(cells)
+    # least[j, i]: of the first j + 1 cells when the last of them is at point i or before; the first is at the start.
+    least = np.empty((len(cells), len(line)))
+    least[0] = 0.0
+    for j in range(1, len(cells)):
+        away = ((line - centres[j]) ** 2).sum(axis=1)
+        np.minimum.accumulate(away + least[j - 1], out=least[j])
+    at = np.full(len(cells), len(line) - 1)
+    for j in range(len(cells) - 2, 0, -1):
+        # The first point that attains the least up to the next cell's.
+        at[j] = np.searchsorted(-least[j], -least[j, at[j + 1]])
+    at[0] = 0
+    found: FloatArray = times[at]
+    return found
+
+
+def steps_in_contact(demonstration: Demonstration) -> NDArray[np.bool_]:
+    """Which steps of a demonstration's path were taken while the person pushed, if only for a part of the step.
+
+    Returns:
+        (k - 1,) one for each step between successive cells.
+    """
+    d = demonstration
+    times = cell_times_s(d.xy_m, d.t_s, d.cells, d.grid)
+    pushed = np.zeros(len(times) - 1, dtype=bool)
+    for contact in d.contacts:
+        pushed |= (times[1:] >= contact.start_s) & (times[:-1] <= contact.end_s)
+    return pushed
+
+
+def _divided(xy_m: FloatArray, t_s: FloatArray, longest_m: float) -> tuple[FloatArray, FloatArray]:
+    """A timed line with points so dense that no piece is longer than a length; its own points stay."""
+    length = np.hypot(*np.diff(xy_m, axis=0).T)
+    pieces = np.maximum(np.ceil(length / longest_m), 1).astype(np.int64)
+    segment = np.repeat(np.arange(len(pieces)), pieces)
+    share = (np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[segment]
+    place = np.append(segment + share, len(pieces))
+    numbers = np.arange(len(t_s))
+    line = np.stack([np.interp(place, numbers, axis) for axis in xy_m.T], axis=1)
+    return line, np.interp(place, numbers, t_s)
