@@ -6,7 +6,7 @@ import pytest
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import replacing
-from navirl_cli.irl.values import InfinitePartitionError, ValueStatus
+from navirl_cli.irl.series import InfinitePartitionError, ValueStatus
 from navirl_cli.parallel import map_in_order
 
 

@@ -8,10 +8,10 @@ import oracles
 import pytest
 
 from navirl_cli.demos.grid import Grid
-from navirl_cli.irl import values
+from navirl_cli.irl import series, values
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.values import InfinitePartitionError, ValueStatus
+from navirl_cli.irl.series import InfinitePartitionError, ValueStatus
 
 
 def cell(scene, state):
@@ -122,15 +122,15 @@ def test_a_long_corridor(c0):
 def bands(monkeypatch):
     """Bands of a few cells on maps of any size; the list gets a True for every use."""
     used = []
-    banded = values._banded_shift
+    raised = values._raised
 
     def watched(*args):
         used.append(True)
-        return banded(*args)
+        return raised(*args)
 
-    monkeypatch.setattr(values, "ROOM", 1.5)
-    monkeypatch.setattr(values, "STEPS_PER_BAND", 5)
-    monkeypatch.setattr(values, "_banded_shift", watched)
+    monkeypatch.setattr(values, "PLAIN_STEPS", 1)
+    monkeypatch.setattr(values, "STEPS_PER_BAND", 5.0)
+    monkeypatch.setattr(values, "_raised", watched)
     return used
 
 
@@ -142,7 +142,7 @@ def test_bands_change_nothing(seed, bands, monkeypatch):
     banded = policy_of(reward, scene)
     assert bands, "this map was to be solved in bands"
     check_policy(scene, reward, banded)
-    monkeypatch.setattr(values, "ROOM", 1e300)
+    monkeypatch.setattr(values, "PLAIN_STEPS", 10_000)
     plain = policy_of(reward, scene)
     assert len(bands) == 1
     assert np.abs(plain.value - banded.value).max() < 1e-10
@@ -177,14 +177,6 @@ def test_a_map_on_which_paths_outnumber_what_a_double_holds():
     inner = scene.lattice.states_of(np.array([[600, 0], [500, 0]]))
     assert np.diff(policy.value[inner])[0] == pytest.approx(100 * fall, rel=1e-10)
     check_visits(scene, policy)
-
-
-def test_the_best_way_through_a_band():
-    # Two cells lead out, at -1 and -50; the third costs 3 more than the first, the fourth 1 more than the second and
-    # 70 more than the third.
-    entry = np.array([-1.0, -50.0, -np.inf, -np.inf])
-    best = values._best_ways(entry, np.array([2, 3, 3]), np.array([0, 1, 2]), np.array([3.0, 1.0, 70.0]))
-    assert best == pytest.approx([-1.0, -50.0, -4.0, -51.0])
 
 
 def attempt(scene, reward):
@@ -263,7 +255,7 @@ def test_an_infinite_partition_function_is_said(theta, people):
 
 def test_no_number_is_returned_when_sweeps_run_out(monkeypatch):
     scene = make.scene_on(make.open_grid(30, 20), [2, 10], [27, 10])
-    monkeypatch.setattr(values, "MAX_SWEEPS", 5)
+    monkeypatch.setattr(series, "MAX_SWEEPS", 5)
     with pytest.raises(InfinitePartitionError, match="too close to an infinite partition function") as caught:
         policy_of(Reward((-20.0, 0.0, 0.0, 1.0)), scene)
     assert caught.value.status is ValueStatus.UNDECIDED
@@ -272,7 +264,8 @@ def test_no_number_is_returned_when_sweeps_run_out(monkeypatch):
 def test_sums_that_do_not_converge_are_not_returned(monkeypatch):
     scene = make.scene_on(make.open_grid(30, 20), [2, 10], [27, 10])
     policy = policy_of(Reward((-20.0, 0.0, 0.0, 1.0)), scene)
-    monkeypatch.setattr(values, "MAX_SWEEPS", 5)
+    monkeypatch.setattr(series, "PLAIN_SWEEPS", 5)
+    monkeypatch.setattr(series, "CORRECTIONS", 0)
     with pytest.raises(InfinitePartitionError, match="too close"):
         policy.visits(np.eye(scene.lattice.size)[scene.start])
 

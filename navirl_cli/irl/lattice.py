@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,17 @@ class Lattice:
         states[inside] = self.index[cells[inside, 1], cells[inside, 0]]
         return states
 
+    @cached_property
+    def _reversed(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The graph of reversed steps as a compressed sparse matrix: places in (n, 8) of its entries, targets, starts.
+
+        The way to a goal is the way from the goal on reversed steps; every step s -> s' has its reverse s' -> s, so
+        that the reversed graph has the same pattern with the costs of the opposite moves.
+        """
+        _, move, target = self.edges
+        starts = np.concatenate([[0], np.cumsum(self.possible.sum(axis=1))])
+        return target * 8 + OPPOSITE[move], target.astype(np.int32), starts.astype(np.int32)
+
     def costs_to(self, goal: int, cost: FloatArray) -> FloatArray:
         """Cost of the cheapest way from every state to the goal (Dijkstra).
 
@@ -91,17 +103,24 @@ class Lattice:
         Returns:
             (n,) costs.
         """
-        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
-        _, move, target = self.edges
-        # The way to the goal is the way from the goal on reversed edges; every edge s -> s' has its reverse s' -> s,
-        # so that the reversed graph has the same pattern with the costs of the opposite moves.
-        reverse = np.broadcast_to(cost, self.neighbours.shape)[target, OPPOSITE[move]]
-        starts = np.concatenate([[0], np.cumsum(self.possible.sum(axis=1))]).astype(np.int32)
-        graph = csr_array((reverse, target.astype(np.int32), starts), shape=(self.size, self.size))
-        found: FloatArray = dijkstra(graph, indices=goal)
+        found: FloatArray = dijkstra(self._reversed_graph(cost), indices=goal)
         return found
+
+    def ways_to(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
+        """As :meth:`costs_to`, with the (n,) next state on each cheapest way, -1 for the goal."""
+        from scipy.sparse.csgraph import dijkstra
+
+        found, following = dijkstra(self._reversed_graph(cost), indices=goal, return_predecessors=True)
+        return found, np.maximum(following, -1)
+
+    def _reversed_graph(self, cost: FloatArray) -> Any:
+        from scipy.sparse import csr_array
+
+        places, targets, starts = self._reversed
+        full = np.broadcast_to(cost, self.neighbours.shape).reshape(-1)
+        return csr_array((full[places], targets, starts), shape=(self.size, self.size))
 
     def descend(self, start: int, goal: int, cost: FloatArray) -> IntArray:
         """States along one cheapest way, start and goal included.

@@ -11,6 +11,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid, IntArray
 from navirl_cli.errors import SceneError
 from navirl_cli.irl.lattice import Lattice
+from navirl_cli.irl.ordering import Ordering
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,17 @@ class Scene:
         return self.lattice.grid.digest, self.start, self.goal, self.people_m.tobytes()
 
     @cached_property
+    def ordering(self) -> Ordering:
+        """The states by the length of their shortest 8-connected way to the goal, m."""
+        lattice = self.lattice
+        cheapest = np.full(lattice.size, lattice.grid.resolution_m)
+        return Ordering(lattice, self.goal, lattice.costs_to(self.goal, lattice.step_m), cheapest)
+
+    @cached_property
     def nominal(self) -> NDArray[np.bool_]:
         """(n,) cells on any shortest obstacle-free 8-connected path from start to goal."""
-        step = self.lattice.step_m
-        from_start, to_goal = self.lattice.costs_to(self.start, step), self.lattice.costs_to(self.goal, step)
+        from_start = self.lattice.costs_to(self.start, self.lattice.step_m)
+        to_goal = self.ordering.distance
         shortest = to_goal[self.start]
         # Sums of many steps in different order differ in their last digits.
         on_path: NDArray[np.bool_] = from_start + to_goal <= shortest * (1 + 1e-9)
