@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import oracles
 from numpy.typing import ArrayLike, NDArray
 
 from navirl_cli.demos.demonstration import Condition, Demonstration
@@ -94,3 +95,29 @@ def by_cell(scene: Scene, by_state: NDArray[np.float64], empty: float) -> NDArra
     columns, rows = scene.lattice.cells.T
     spread[rows, columns] = by_state
     return spread
+
+
+def by_participants(scene: Scene, reward: Reward, participants: int, each: int, seed: int) -> list[Demonstration]:
+    """Demonstrations sampled from one reward, so many of each participant p01, p02, ..., one after the other."""
+    names = [f"p{number + 1:02d}" for number in range(participants) for _ in range(each)]
+    paths = drawn(scene, reward, len(names), seed)
+    return [
+        replace(one, participant=name, id=f"{name}/{k + 1}")
+        for k, (one, name) in enumerate(zip(paths, names, strict=True))
+    ]
+
+
+def slow_values(scene: Scene, reward: Reward) -> NDArray[np.float64]:
+    """(n,) soft values by value iteration in the log domain."""
+    goal_column, goal_row = scene.lattice.cells[scene.goal].tolist()
+    found = oracles.soft_values(by_cell(scene, reward.on(scene).value, -np.inf), (goal_column, goal_row))
+    columns, rows = scene.lattice.cells.T
+    return found[rows, columns]
+
+
+def dense(scene: Scene, reward: Reward) -> NDArray[np.float64]:
+    """(n, n) matrix M(s, s') = exp(r(s, a)) of the steps, written out."""
+    matrix = np.zeros((scene.lattice.size, scene.lattice.size))
+    source, move, target = scene.lattice.edges
+    matrix[source, target] = np.exp(reward.on(scene).value[source, move])
+    return matrix

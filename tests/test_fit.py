@@ -5,10 +5,14 @@ import numpy as np
 import pytest
 
 from navirl_cli.errors import RewardError
-from navirl_cli.irl.fit import Status, fit
-from navirl_cli.irl.likelihood import evidence_of, likelihood, log_likelihood
+from navirl_cli.irl import fit as fit_module
+from navirl_cli.irl import objective as objective_module
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import Method, fit
+from navirl_cli.irl.likelihood import likelihood, log_likelihood, policy_of
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.values import InfinitePartitionError
+from navirl_cli.irl.series import InfinitePartitionError, ValueStatus
+from navirl_cli.irl.status import Status
 
 TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
 START = Reward.named({})
@@ -136,11 +140,107 @@ def test_a_start_without_a_partition_function_is_refused(many):
 
 
 def test_every_status_says_what_to_do():
-    assert {status.value for status in Status} == {"converged", "stopped early", "on bound", "not identified"}
-    assert len({status.advice for status in Status}) == 4
+    assert [status.value for status in Status] == [
+        "converged",
+        "stopped early",
+        "on bound",
+        "not identified",
+        "infinite partition function",
+    ]
+    assert len({status.advice for status in Status}) == 5
 
 
 def test_the_same_evidence_gives_the_same_fit(many):
     one, two = fit(many, START), fit(many, START)
     assert one.reward == two.reward
     assert (one.covariance == two.covariance).all()
+
+
+@pytest.mark.parametrize("fixed", [("sigma_p",), ("c0", "a_g"), ("c0", "a_g", "a_p", "sigma_p")])
+def test_fixed_parameters_stay_and_the_others_make_the_best_of_it(many, fixed):
+    start = Reward((-34.0, -0.4, -3.0, 3.5))
+    found = fit(many, start, l2=0.0, fixed=fixed)
+    held = np.array([parameter.name in fixed for parameter in start.parameters])
+    assert found.status is Status.CONVERGED
+    assert (np.array(found.reward.theta)[held] == np.array(start.theta)[held]).all()
+    assert np.isnan(found.standard_errors[held]).all()
+    assert np.isfinite(found.standard_errors[~held]).all()
+    found_likelihood = likelihood(many, found.reward)
+    assert np.abs(found_likelihood.gradient[~held] * found.standard_errors[~held]).max(initial=0.0) < 1e-3
+    assert found.covariance[np.ix_(~held, ~held)] == pytest.approx(
+        np.linalg.inv(-found_likelihood.hessian[np.ix_(~held, ~held)]), rel=1e-6
+    )
+    assert found.log_likelihood < fit(many, start, l2=0.0).log_likelihood
+    if held.all():
+        assert found.reward == start
+        assert found.iterations == 0
+
+
+def test_a_parameter_held_on_its_bound_is_not_said_to_have_ended_there(many):
+    found = fit(many, Reward((-40.0, 0.0, -2.0, 1.0)), l2=0.0, fixed=("a_g",))
+    assert found.reward.theta[1] == 0.0
+    assert not found.on_bound.any()
+    assert found.status is Status.CONVERGED
+
+
+def test_without_restarts_one_search_is_made_and_adam_makes_one_only(many):
+    alone, all_starts = fit(many, START, l2=0.0, restarts=False), fit(many, START, l2=0.0)
+    assert alone.evaluations < all_starts.evaluations
+    assert alone.evaluations <= 2 * (alone.iterations + 2)
+    assert alone.reward.theta == pytest.approx(all_starts.reward.theta, rel=1e-3)
+    adam = fit(many, START, method=Method.ADAM)
+    assert adam.evaluations >= adam.iterations + 1
+    assert adam.method is Method.ADAM
+
+
+def test_where_the_way_up_leads_out_of_the_finite_it_is_said(monkeypatch):
+    # The partition function never ends abruptly; here it is made to.
+    real = objective_module.likelihood
+
+    def cliff(evidence, reward):
+        if reward.theta[0] > -30.0:
+            raise InfinitePartitionError(ValueStatus.INFINITE)
+        return real(evidence, reward)
+
+    monkeypatch.setattr(objective_module, "likelihood", cliff)
+    evidence = evidence_of(make.drawn(ALONE, Reward((-24.0, -0.6, 0.0, 1.0)), 30, seed=3))
+    found = fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), l2=0.0)
+    assert found.status is Status.INFINITE
+    assert found.reward.theta[0] == pytest.approx(-30.0, abs=1e-3)
+    assert "endless detours outweigh the direct way" in found.status.advice
+
+
+def test_wandering_demonstrations_are_learnt_close_to_the_edge_of_the_finite():
+    # To and fro, again and again: the policy that drives as far on average is close to none at all.
+    grid = make.open_grid(12, 7)
+    there = [[c, 3] for c in range(10)]
+    wander = [*there, *([*there[::-1][1:], *there[1:]] * 6), [10, 3], [11, 3]]
+    evidence = evidence_of([make.demonstration(grid, wander)])
+    found = fit(evidence, Reward((-50.0,), START.terms[:1]), l2=0.0)
+    assert found.status is Status.CONVERGED
+    scene = evidence.scenes[0].scene
+    policy = policy_of(found.reward, scene)
+    way = policy.expected_to_goal((policy.probability * scene.lattice.step_m).sum(axis=1))[scene.start]
+    assert way == pytest.approx(0.1 * (len(wander) - 1), rel=1e-4)
+    with pytest.raises(InfinitePartitionError):
+        policy_of(Reward((found.reward.theta[0] + 0.5,), START.terms[:1]), scene)
+
+
+def test_a_search_that_is_cut_short_says_so(many, monkeypatch):
+    from navirl_cli.irl import newton
+
+    monkeypatch.setattr(newton, "MAX_ITERATIONS", 2)
+    assert fit(many, START, l2=0.0, restarts=False).status is Status.STOPPED_EARLY
+
+
+def test_the_worst_ending_is_the_one_that_is_told():
+    best = fit_module.Maximum(None, True, False, None, None)
+    yes, no = np.array([True, True]), np.array([True, False])
+    for maximum, identified, on_bound, status in (
+        (best, yes, ~yes, Status.CONVERGED),
+        (best, yes, no, Status.ON_BOUND),
+        (best, no, no, Status.NOT_IDENTIFIED),
+        (fit_module.Maximum(None, False, False, None, None), no, no, Status.STOPPED_EARLY),
+        (fit_module.Maximum(None, False, True, None, None), yes, ~yes, Status.INFINITE),
+    ):
+        assert fit_module._status(maximum, identified, on_bound) is status

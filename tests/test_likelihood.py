@@ -9,8 +9,16 @@ import pytest
 
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.evidence import evidence_of, moves_along
 from navirl_cli.irl.fit import fit
-from navirl_cli.irl.likelihood import evidence_of, likelihood, log_likelihood, moves_along, policy_of
+from navirl_cli.irl.likelihood import (
+    feature_sums,
+    likelihood,
+    log_likelihood,
+    policy_of,
+    step_likelihood,
+    value_and_gradient,
+)
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward
 
@@ -221,3 +229,144 @@ def test_only_the_cells_count_not_the_poses():
     one = make.demonstration(scene.lattice.grid, scene.lattice.cells[states])
     other = replace(one, t_s=one.t_s * 3, yaw_rad=one.yaw_rad + 1.0, xy_m=one.xy_m + 0.02)
     assert log_likelihood(evidence_of([one]), TRUTH) == log_likelihood(evidence_of([other]), TRUTH)
+
+
+def test_steps_sum_to_their_demonstrations_and_to_the_whole():
+    evidence = evidence_of(crowd(2))
+    found, steps = likelihood(evidence, TRUTH), step_likelihood(evidence, TRUTH)
+    assert len(steps.value) == len(steps.number) == evidence.steps
+    assert steps.value.sum() == pytest.approx(found.value, rel=1e-12)
+    assert (steps.value < 0).all()
+    for owner in range(evidence.count):
+        own = steps.demonstration == owner
+        assert sorted(steps.number[own].tolist()) == list(range(int(own.sum())))
+        assert steps.gradient[own].sum(axis=0) == pytest.approx(found.scores[owner], rel=1e-9, abs=1e-10)
+
+
+def slow_steps(one, theta):
+    """log p(a|s) of every step of a path, by value iteration."""
+    goal = tuple(one.cells[-1].tolist())
+    where = ~one.grid.occupied, tuple(one.cells[0].tolist()), goal, one.people_m, 0.1, one.grid.origin_m
+    reward = oracles.paper_reward(tuple(theta), *where)
+    policy = oracles.soft_policy(reward, oracles.soft_values(reward, goal))
+    columns, rows = one.cells[:-1].T
+    return np.log(policy[rows, columns, moves_along(one.cells)])
+
+
+@pytest.mark.parametrize("theta", [(-35.0, -0.6, -3.0, 2.0), (-26.0, -0.1, 0.3, 6.0)])
+def test_every_step_and_its_gradient_against_value_iteration(theta):
+    demonstrations = crowd(1)
+    evidence = evidence_of(demonstrations)
+    steps = step_likelihood(evidence, Reward(theta))
+    for owner, one in enumerate(demonstrations):
+        own = np.flatnonzero(steps.demonstration == owner)
+        own = own[np.argsort(steps.number[own])]
+        assert steps.value[own] == pytest.approx(slow_steps(one, theta), rel=1e-9)
+        if owner in {0, 3}:
+            slow = oracles.derivative(lambda x, one=one: slow_steps(one, x), np.array(theta))
+            assert steps.gradient[own] == pytest.approx(slow, rel=1e-6, abs=1e-7)
+
+
+def test_some_of_the_steps_have_their_own_value_gradient_and_hessian():
+    demonstrations, rng = crowd(2), np.random.default_rng(8)
+    whole = evidence_of(demonstrations)
+    masks = [rng.random(len(one.cells) - 1) < 0.4 for one in demonstrations]
+    masks[1][:] = False
+    some = whole.only(masks)
+    theta = np.array([-33.0, -0.4, -2.0, 1.5])
+
+    def value(x):
+        return log_likelihood(some, Reward(tuple(x)))
+
+    def gradient(x):
+        return likelihood(some, Reward(tuple(x))).gradient
+
+    found = likelihood(some, Reward(tuple(theta)))
+    steps = step_likelihood(whole, Reward(tuple(theta)))
+    taken = [masks[owner][number] for owner, number in zip(steps.demonstration, steps.number, strict=True)]
+    assert found.value == pytest.approx(steps.value[taken].sum(), rel=1e-12)
+    assert found.gradient == pytest.approx(steps.gradient[taken].sum(axis=0), rel=1e-9, abs=1e-10)
+    assert found.gradient == pytest.approx(oracles.derivative(value, theta), rel=1e-6, abs=1e-7)
+    assert found.hessian == pytest.approx(oracles.derivative(gradient, theta), rel=1e-6, abs=1e-7)
+    assert (found.scores[1] == 0).all()
+
+
+@pytest.mark.parametrize("people", [0, 2])
+def test_value_and_gradient_are_those_of_the_likelihood(people):
+    demonstrations = crowd(people)
+    whole = evidence_of(demonstrations)
+    some = whole.only([np.arange(len(one.cells) - 1) % 3 == 0 for one in demonstrations])
+    for evidence in (whole, some, whole.repeated(np.array([0, 2, 1, 0, 3]))):
+        found = likelihood(evidence, TRUTH)
+        value, gradient = value_and_gradient(evidence, TRUTH)
+        assert value == pytest.approx(found.value, rel=1e-13)
+        assert gradient == pytest.approx(found.gradient, rel=1e-9, abs=1e-9)
+
+
+def test_repeated_demonstrations_count_as_often():
+    evidence = evidence_of(crowd(2))
+    counts = np.array([2, 0, 1, 3, 1])
+    found, again = likelihood(evidence, TRUTH), likelihood(evidence.repeated(counts), TRUTH)
+    assert again.scores == pytest.approx(counts[:, None] * found.scores, rel=1e-9, abs=1e-9)
+    alone = [likelihood(evidence.repeated(np.eye(5, dtype=int)[i]), TRUTH) for i in range(5)]
+    assert again.hessian == pytest.approx(sum(c * one.hessian for c, one in zip(counts, alone, strict=True)), rel=1e-9)
+
+
+def test_the_information_is_the_covariance_of_the_gradients_of_sampled_paths():
+    count = 3000
+    scene = make.scene_on(make.open_grid(12, 7), [0, 3], [11, 3], [[0.6, 0.3]])
+    found = likelihood(evidence_of(make.drawn(scene, TRUTH, count, seed=21)), TRUTH)
+    # The true mean of the gradients is zero: their covariance is the mean of their products.
+    products = found.scores[:, :, None] * found.scores[:, None, :]
+    error = products.std(axis=0, ddof=1) / np.sqrt(count)
+    assert (error < 0.1 * np.sqrt(np.outer(np.diag(found.information), np.diag(found.information))) / count).all()
+    assert (np.abs(products.mean(axis=0) - found.information / count) < 4 * error).all()
+
+
+@pytest.mark.parametrize("people", [0, 1, 2])
+def test_for_parameters_that_the_reward_is_linear_in_the_information_is_the_curvature(people):
+    demonstrations = crowd(people)
+    some = evidence_of(demonstrations).only([np.arange(len(one.cells) - 1) % 2 == 0 for one in demonstrations])
+    for evidence in (evidence_of(demonstrations), some):
+        found = likelihood(evidence, TRUTH)
+        assert found.information[:3, :3] == pytest.approx(-found.hessian[:3, :3], rel=1e-12)
+        assert (found.information == found.information.T).all()
+    if people:
+        whole = likelihood(evidence_of(demonstrations), TRUTH)
+        assert whole.information[3, 3] != pytest.approx(-whole.hessian[3, 3], rel=1e-3)
+        assert (np.linalg.eigvalsh(whole.information) > 0).all()
+
+
+def test_feature_sums_are_sums_over_the_steps_that_count():
+    demonstrations = crowd(1)
+    evidence = evidence_of(demonstrations)
+    found = feature_sums(evidence, TRUTH)
+    lengths = [np.hypot(*np.diff(one.cells, axis=0).T).sum() * 0.1 for one in demonstrations]
+    assert found[0] == pytest.approx(sum(lengths))
+    a_p, sigma_p = TRUTH.theta[2:]
+    squared = np.concatenate(
+        [((one.grid.centres_of(one.cells[:-1]) - one.people_m[0]) ** 2).sum(axis=1) for one in demonstrations]
+    )
+    bump = np.exp(-sigma_p * squared)
+    assert found[2:] == pytest.approx([bump.sum(), -(a_p * squared * bump).sum()])
+    assert feature_sums(evidence.repeated(np.full(5, 2)), TRUTH) == pytest.approx(2 * found)
+
+
+@pytest.mark.parametrize("change", [shifted, mirrored, turned], ids=lambda change: change.__name__)
+def test_where_and_how_the_world_lies_does_not_change_the_fit(change):
+    scene = make.scene_on(make.open_grid(16, 9, (-0.35, 0.8)), [0, 4], [15, 4], [[0.45, 1.2]])
+    demonstrations = make.drawn(scene, TRUTH, 30, seed=5)
+    one, other = (fit(evidence_of(some), Reward.named({})) for some in (demonstrations, [*map(change, demonstrations)]))
+    assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-10)
+    assert one.reward.theta == pytest.approx(other.reward.theta, rel=1e-6)
+    assert one.covariance == pytest.approx(other.covariance, rel=1e-5)
+
+
+def test_the_order_of_demonstrations_does_not_change_the_fit():
+    scene = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4], [[0.8, 0.4]])
+    demonstrations = make.by_participants(scene, TRUTH, 5, 6, seed=5)
+    shuffled = [demonstrations[i] for i in np.random.default_rng(0).permutation(30)]
+    one, other = (fit(evidence_of(some), Reward.named({})) for some in (demonstrations, shuffled))
+    assert one.reward.theta == pytest.approx(other.reward.theta, rel=1e-6)
+    assert one.covariance == pytest.approx(other.covariance, rel=1e-5)
+    assert one.clustered == pytest.approx(other.clustered, rel=1e-5)

@@ -22,7 +22,8 @@ def climb(objective, start, lower=None, upper=None, free=None, progress=None):
     lower = np.full(len(start), -ALL) if lower is None else np.asarray(lower, dtype=float)
     upper = np.full(len(start), ALL) if upper is None else np.asarray(upper, dtype=float)
     free = np.ones(len(start), dtype=bool) if free is None else np.asarray(free)
-    return maximise(objective, start, lower, upper, free, progress)
+    begin = objective(np.clip(start, lower, upper))
+    return maximise(objective, begin, (lower, upper), free, progress)
 
 
 def test_a_quadratic_is_climbed_to_its_top_and_every_accepted_point_is_reported():
@@ -32,9 +33,10 @@ def test_a_quadratic_is_climbed_to_its_top_and_every_accepted_point_is_reported(
     found = climb(quadratic(-hessian @ top, hessian), [0.0, 0.0], progress=seen.append)
     assert found.converged
     assert found.best.x == pytest.approx(top, abs=1e-9)
-    assert [point.value for point in found.path[1:]] == [point.value for point in seen]
-    assert (np.diff([point.value for point in found.path]) > 0).all()
-    assert found.evaluations >= len(found.path)
+    assert found.path_value[1:].tolist() == seen
+    assert (np.diff(found.path_value) > 0).all()
+    assert found.path[0].tolist() == [0.0, 0.0]
+    assert found.path[-1].tolist() == found.best.x.tolist()
 
 
 def test_a_bound_is_met_and_the_others_make_the_best_of_it():
@@ -145,7 +147,8 @@ def test_where_the_objective_does_not_exist_the_step_is_shortened():
     found = climb(objective, [1e-3])
     assert found.converged
     assert found.best.x[0] == pytest.approx(0.5, abs=1e-4)
-    assert all(np.isfinite(point.value) for point in found.path)
+    assert np.isfinite(found.path_value).all()
+    assert not found.blocked
 
 
 def test_in_front_of_a_cliff_it_does_not_claim_to_have_arrived():
@@ -155,6 +158,7 @@ def test_in_front_of_a_cliff_it_does_not_claim_to_have_arrived():
 
     found = climb(objective, [0.0])
     assert not found.converged
+    assert found.blocked
     assert found.best.x[0] == pytest.approx(1.0, abs=1e-6)
     assert np.isfinite(found.best.value)
 
@@ -214,3 +218,24 @@ def test_region_step_in_the_hard_case():
 
 def test_no_region_no_step():
     assert np.linalg.norm(_region_step(np.array([1.0, 2.0]), np.diag([-1.0, 2.0]), 0.0)) < 1e-9
+
+
+def waves(x):
+    """Tops at 0 and near 2 pi, the second one lower."""
+    return Point(
+        x,
+        float(np.cos(x[0]) - x[0] ** 2 / 1000),
+        np.array([-np.sin(x[0]) - x[0] / 500]),
+        np.array([[-np.cos(x[0]) - 1 / 500]]),
+    )
+
+
+@pytest.mark.parametrize(("start", "same"), [(0.9, True), (-0.5, True), (5.5, False), (1.6, True), (4.6, False)])
+def test_a_climb_that_is_bound_for_a_known_top_ends_there_and_no_other(start, same):
+    top = climb(waves, [0.3]).best
+    begin = waves(np.array([start]))
+    again = maximise(waves, begin, (np.array([-20.0]), np.array([20.0])), np.array([True]), known=[top])
+    assert again.converged is not same
+    assert abs(again.best.x[0] - top.x[0]) < (1.0 if same else 10.0)
+    if not same:
+        assert again.best.x[0] == pytest.approx(2 * np.pi, abs=0.02)

@@ -9,7 +9,8 @@ import oracles
 import pytest
 
 from navirl_cli.errors import RewardError
-from navirl_cli.irl.likelihood import evidence_of, likelihood, log_likelihood
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.likelihood import likelihood, log_likelihood
 from navirl_cli.irl.reward import PAPER_TERMS, Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet, Parameter, Term

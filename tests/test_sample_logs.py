@@ -8,8 +8,9 @@ from truth import read_truth
 
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, compare
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Status, fit
-from navirl_cli.irl.likelihood import evidence_of, log_likelihood
+from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.logs.load import load_recording
 from navirl_cli.simulation.log import write_log

@@ -8,12 +8,16 @@ import factories as make
 import numpy as np
 import pytest
 import study_data
+from scipy.optimize import minimize
 
 from navirl_cli.demos.rasterize import rasterize
 from navirl_cli.evaluation.metrics import path_metrics
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
-from navirl_cli.irl.likelihood import evidence_of, likelihood, log_likelihood
+from navirl_cli.irl.likelihood import likelihood, log_likelihood, value_and_gradient
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.series import InfinitePartitionError
+from navirl_cli.irl.status import Status
 
 PRESENT = (study_data.ROOT / "expected.json").is_file()
 needs_study = pytest.mark.skipif(not PRESENT, reason=study_data.REASON)
@@ -82,6 +86,59 @@ def test_a_fit_climbs_past_the_bound_at_which_plain_newton_sticks(study):
     assert found.reward.theta[1] < -0.05
     assert stuck.log_likelihood == pytest.approx(found.log_likelihood, abs=1e-3)
     assert found.log_likelihood > log_likelihood(demonstrated, Reward.named(EXPECTED["theta_published_si"]))
+
+
+def climbed(demonstrated, l2, starts, seed):
+    """Objectives that L-BFGS-B reaches from random starts, the highest first."""
+    scale = np.array([10.0, 1.0, 1.0, 1.0])
+    bounds = [(parameter.lower, parameter.upper) for parameter in Reward.named({}).parameters]
+    lower, upper = np.transpose(bounds)
+
+    def downhill(x):
+        theta = np.clip(x * scale, lower, upper)
+        try:
+            value, gradient = value_and_gradient(demonstrated, Reward(tuple(theta.tolist())))
+        except InfinitePartitionError:
+            return 1e4, np.zeros(4)
+        return l2 / 2 * float(x @ x) - value, l2 * x - gradient * scale
+
+    rng = np.random.default_rng(seed)
+    reached = []
+    for _ in range(starts):
+        start = [rng.uniform(-10, -2.5), rng.uniform(-5, 0), rng.uniform(-20, 2), 10 ** rng.uniform(-1, 1)]
+        options = {"maxiter": 500, "ftol": 1e-13, "gtol": 1e-7}
+        in_units = list(zip(lower / scale, upper / scale, strict=True))
+        reached.append(-minimize(downhill, start, jac=True, method="L-BFGS-B", bounds=in_units, options=options).fun)
+    return sorted(reached, reverse=True)
+
+
+SECOND, BOTH = ("force_demos/passing_2",), ("force_demos/passing_1", "force_demos/passing_2")
+
+
+def check_best(study, names, l2, starts):
+    demonstrated = evidence([one for name in names for one in study["3930"][name]])
+    found = fit(demonstrated, Reward.named(EXPECTED["theta_study_initial_si"]), l2)
+    assert found.status is Status.CONVERGED
+    reached = climbed(demonstrated, l2, starts, seed=0)
+    assert found.objective > reached[0] - 1e-4
+    assert found.objective == pytest.approx(reached[0], abs=1e-3), "and the other method comes as high"
+    return found
+
+
+@needs_study
+@pytest.mark.parametrize(
+    ("names", "starts", "value"), [(SECOND, 6, -56.5135), (BOTH, 2, -107.8381)], ids=["second", "both"]
+)
+def test_no_random_start_of_another_method_ends_higher(study, names, starts, value):
+    assert check_best(study, names, 1e-3, starts).objective == pytest.approx(value, abs=1e-3)
+
+
+@pytest.mark.slow
+@needs_study
+@pytest.mark.parametrize("l2", [1e-3, 0.0])
+@pytest.mark.parametrize("names", [SECOND, BOTH], ids=["second", "both"])
+def test_none_of_fifty_random_starts_of_another_method_ends_higher(study, names, l2):
+    check_best(study, names, l2, 50)
 
 
 @pytest.mark.parametrize(("module", "name"), [("os", "system"), ("builtins", "eval"), ("numpy", "load")])

@@ -8,49 +8,17 @@ the net flow w of the steps (out of a state minus into it), which is one solve w
     sum_s w(s) d2V(s) = sum_s D_w(s) ( Cov_a[f_j + Y_j(s'), f_k + Y_k(s')] + E_a[d2r/dj dk] ),  D_w = (I - P^T)^-1 w.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import MOVES, FloatArray, IntArray
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.irl.evidence import Evidence, SceneEvidence
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import Scene, scenes_of
+from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet
 from navirl_cli.irl.values import Policy, solve
-
-
-@dataclass(frozen=True)
-class SceneEvidence:
-    """All steps that were demonstrated in one scene."""
-
-    scene: Scene
-    #: (m,) state that each step leaves, and number of its move.
-    state: IntArray
-    move: IntArray
-    #: (m,) number of the demonstration (in the whole list) that each step belongs to.
-    owner: IntArray
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Demonstrated steps, by scene."""
-
-    scenes: tuple[SceneEvidence, ...]
-    #: Number of demonstrations, and the participant of each.
-    count: int
-    participants: tuple[str, ...]
-
-    @property
-    def steps(self) -> int:
-        """Number of steps; repeated steps count each time."""
-        return sum(len(part.state) for part in self.scenes)
-
-    def uniform_log_likelihood(self) -> float:
-        """Log-likelihood of the same steps when every possible move is equally likely."""
-        return -sum(float(np.log(part.scene.lattice.possible[part.state].sum(axis=1)).sum()) for part in self.scenes)
 
 
 @dataclass(frozen=True)
@@ -64,44 +32,21 @@ class Likelihood:
     hessian: FloatArray
     #: (demonstrations, k) gradient of each demonstration's log-likelihood: rows sum to the gradient.
     scores: FloatArray
+    #: (k, k) covariance of the gradient if the reward were true (Fisher's information).
+    information: FloatArray
 
 
-def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
-    """Collect the steps of demonstrations by scene.
+@dataclass(frozen=True)
+class StepLikelihood:
+    """The likelihood step by step."""
 
-    Raises:
-        SceneError: A demonstration's scene has no way from start to goal.
-        DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
-    """
-    if not demonstrations:
-        raise DemonstrationError("no demonstration to learn from: check --condition, --cycle and --only-corrected")
-    steps: dict[int, list[tuple[IntArray, IntArray, int]]] = {}
-    scenes = scenes_of(demonstrations)
-    for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):
-        states = scene.lattice.states_of(demonstration.cells)
-        if (states[:-1] == scene.goal).any():
-            raise DemonstrationError(
-                f"demonstration {demonstration.id}: its path passes the goal's cell before it ends there; "
-                "end the trial at the first arrival"
-            )
-        moves = moves_along(demonstration.cells)
-        steps.setdefault(id(scene), []).append((states[:-1], moves, owner))
-    parts = []
-    for scene in {id(scene): scene for scene in scenes}.values():
-        own = steps[id(scene)]
-        owners = np.concatenate([np.full(len(states), owner) for states, _, owner in own])
-        state, move = (np.concatenate([step[i] for step in own]) for i in (0, 1))
-        parts.append(SceneEvidence(scene, state, move, owners))
-    return Evidence(tuple(parts), len(demonstrations), tuple(d.participant for d in demonstrations))
-
-
-def moves_along(cells: IntArray) -> IntArray:
-    """Numbers of the moves (rows of MOVES) between successive (k, 2) cells."""
-    difference = np.diff(cells, axis=0)
-    number = np.full((3, 3), -1)
-    number[MOVES[:, 0] + 1, MOVES[:, 1] + 1] = np.arange(8)
-    moves: IntArray = number[difference[:, 0] + 1, difference[:, 1] + 1]
-    return moves
+    #: (m,) number of the demonstration that each step belongs to, and of the step on its path.
+    demonstration: IntArray
+    number: IntArray
+    #: (m,) log p(a|s).
+    value: FloatArray
+    #: (m, k) gradient of each.
+    gradient: FloatArray
 
 
 def policy_of(reward: Reward, scene: Scene) -> Policy:
@@ -110,17 +55,30 @@ def policy_of(reward: Reward, scene: Scene) -> Policy:
     Raises:
         InfinitePartitionError: The partition function is infinite.
     """
-    return solve(scene.lattice, scene.goal, reward.on(scene).value)
+    return solve(scene.ordering, reward.on(scene).value)
 
 
 def log_likelihood(evidence: Evidence, reward: Reward) -> float:
     """Log-likelihood alone, without derivatives."""
     total = 0.0
     for part in evidence.scenes:
-        jet = reward.on(part.scene)
-        policy = solve(part.scene.lattice, part.scene.goal, jet.value)
-        total += float(_step_log_likelihood(part, jet, policy).sum())
+        jet, policy = _solved(part, reward)
+        total += float(_step_values(part, jet, policy).sum())
     return total
+
+
+def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, FloatArray]:
+    """Log-likelihood and (k,) gradient at the least cost: one solve for the value and one for the visits.
+
+    Raises:
+        InfinitePartitionError: The partition function is infinite in one of the scenes.
+    """
+    value, gradient = 0.0, np.zeros(len(reward.theta))
+    for part in evidence.scenes:
+        jet, policy = _solved(part, reward)
+        value += float(_step_values(part, jet, policy).sum())
+        gradient += _at_steps(jet.first, part).sum(axis=0) - _flow(part, policy) @ _means(jet.first, policy)
+    return value, gradient
 
 
 def likelihood(evidence: Evidence, reward: Reward) -> Likelihood:
@@ -134,70 +92,135 @@ def likelihood(evidence: Evidence, reward: Reward) -> Likelihood:
         InfinitePartitionError: The partition function is infinite in one of the scenes.
     """
     k = len(reward.theta)
-    value, hessian, scores = 0.0, np.zeros((k, k)), np.zeros((evidence.count, k))
+    value, hessian, scores, information = 0.0, np.zeros((k, k)), np.zeros((evidence.count, k)), np.zeros((k, k))
     for part in evidence.scenes:
-        jet = reward.on(part.scene)
-        policy = solve(part.scene.lattice, part.scene.goal, jet.value)
-        value += float(_step_log_likelihood(part, jet, policy).sum())
+        jet, policy = _solved(part, reward)
+        value += float(_step_values(part, jet, policy).sum())
         slope = policy.expected_to_goal(_means(jet.first, policy))
-        steps = _step_gradient(part, jet, slope)
-        np.add.at(scores, part.owner, steps)
-        hessian += _hessian(part, jet, policy, slope)
-    return Likelihood(value, scores.sum(axis=0), hessian, scores)
+        for j, one in enumerate(_step_gradients(part, jet, slope).T):
+            scores[:, j] += np.bincount(part.owner, one, minlength=evidence.count)
+        expected, bend = _curvature(part, jet, policy, slope)
+        information += expected
+        hessian += bend - expected
+    return Likelihood(value, scores.sum(axis=0), hessian, scores, information)
 
 
-def _step_log_likelihood(part: SceneEvidence, jet: Jet, policy: Policy) -> FloatArray:
+def step_likelihood(evidence: Evidence, reward: Reward) -> StepLikelihood:
+    """log p(a|s) of every step with its gradient f(s, a) + Y(s') - Y(s), in the order of the scenes.
+
+    Raises:
+        InfinitePartitionError: The partition function is infinite in one of the scenes.
+    """
+    values, gradients = [], []
+    for part in evidence.scenes:
+        jet, policy = _solved(part, reward)
+        values.append(_step_values(part, jet, policy))
+        gradients.append(_step_gradients(part, jet, policy.expected_to_goal(_means(jet.first, policy))))
+    owners, numbers = (
+        np.concatenate([getattr(part, name) for part in evidence.scenes]) for name in ("owner", "number")
+    )
+    return StepLikelihood(owners, numbers, np.concatenate(values), np.concatenate(gradients))
+
+
+def feature_sums(evidence: Evidence, reward: Reward) -> FloatArray:
+    """(k,) sums of the features dr/dtheta over the demonstrated steps."""
+    sums = [_at_steps(reward.on(part.scene).first, part).sum(axis=0) for part in evidence.scenes]
+    return np.asarray(np.sum(sums, axis=0))
+
+
+def path_covariance(evidence: Evidence, reward: Reward) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """Covariance of sums along whole paths, if the reward were true, summed over the demonstrations.
+
+    Args:
+        evidence: Gives scenes, and how many paths start where.
+        reward: The reward; k parameters.
+
+    Returns:
+        (k + p, k + p) of the k first derivatives of the reward and the p second ones that are not zero everywhere; the
+        pairs of parameters that these belong to.
+    """
+    pairs = sorted({pair for part in evidence.scenes for pair in reward.on(part.scene).second})
+    k = len(reward.theta)
+    total = np.zeros((k + len(pairs), k + len(pairs)))
+    for part in evidence.scenes:
+        jet, policy = _solved(part, reward)
+        features = [*jet.first, *(jet.second.get(pair, np.zeros((1, 1))) for pair in pairs)]
+        slope = policy.expected_to_goal(_means(features, policy))
+        total += _covariance(features, policy, slope, policy.probability * _flow(part, policy)[:, None])
+    return total, pairs
+
+
+def _solved(part: SceneEvidence, reward: Reward) -> tuple[Jet, Policy]:
+    """Reward and policy in the evidence's scene."""
+    jet = reward.on(part.scene)
+    return jet, solve(part.scene.ordering, jet.value)
+
+
+def _step_values(part: SceneEvidence, jet: Jet, policy: Policy) -> FloatArray:
     """(m,) log p(a|s) of every step."""
-    target = part.scene.lattice.neighbours[part.state, part.move]
-    logs: FloatArray = jet.value[part.state, part.move] + policy.value[target] - policy.value[part.state]
+    logs: FloatArray = jet.value[part.state, part.move] + policy.value[part.target] - policy.value[part.state]
     return logs
 
 
-def _means(features: Iterable[FloatArray], policy: Policy) -> FloatArray:
+def _at_steps(features: Sequence[FloatArray], part: SceneEvidence) -> FloatArray:
+    """(m, k) features, each broadcastable to (n, 8), at the demonstrated steps."""
+    shape = part.scene.lattice.neighbours.shape
+    return np.stack([np.broadcast_to(feature, shape)[part.state, part.move] for feature in features], axis=1)
+
+
+def _means(features: Sequence[FloatArray], policy: Policy) -> FloatArray:
     """(n, k) expectation of step features over the moves in each state."""
-    inside = policy.probability.sum(axis=1)
     return np.stack(
         [
-            feature[:, 0] * inside if feature.shape[1] == 1 else (policy.probability * feature).sum(axis=1)
+            # Features by cell have a zero in the goal's row.
+            feature[:, 0] if feature.shape[1] == 1 else (policy.probability * feature).sum(axis=1)
             for feature in features
         ],
         axis=1,
     )
 
 
-def _step_gradient(part: SceneEvidence, jet: Jet, slope: FloatArray) -> FloatArray:
+def _step_gradients(part: SceneEvidence, jet: Jet, slope: FloatArray) -> FloatArray:
     """(m, k) gradient of every step's log-likelihood."""
-    lattice = part.scene.lattice
-    features = np.stack(
-        [np.broadcast_to(first, (lattice.size, 8))[part.state, part.move] for first in jet.first], axis=1
-    )
-    gradient: FloatArray = features + slope[lattice.neighbours[part.state, part.move]] - slope[part.state]
-    return gradient
+    gradients: FloatArray = _at_steps(jet.first, part) + slope[part.target] - slope[part.state]
+    return gradients
 
 
-def _hessian(part: SceneEvidence, jet: Jet, policy: Policy, slope: FloatArray) -> FloatArray:
-    """(k, k) Hessian of the log-likelihood of one scene's steps."""
-    lattice = part.scene.lattice
-    target = lattice.neighbours[part.state, part.move]
-    net = np.bincount(part.state, minlength=lattice.size) - np.bincount(target, minlength=lattice.size)
+def _flow(part: SceneEvidence, policy: Policy) -> FloatArray:
+    """(n,) visits that start wherever the steps leave more often than they enter: D_w."""
+    size = part.scene.lattice.size
+    net = np.bincount(part.state, minlength=size) - np.bincount(part.target, minlength=size)
     net[part.scene.goal] = 0  # the goal's value is zero whatever the parameters
-    flow = policy.visits(net.astype(float))
-    k = len(jet.first)
-    result = np.zeros((k, k))
-    # What a move changes of the expected sum of features, around its mean Y(s) in the state.
-    gains = [
-        np.broadcast_to(first, (lattice.size, 8)) + slope[lattice.neighbours, j] - slope[:, j, None]
-        for j, first in enumerate(jet.first)
-    ]
-    weight = policy.probability * flow[:, None]
-    for j in range(k):
-        weighted = weight * gains[j]
-        for i in range(j + 1):
-            result[i, j] = result[j, i] = -float((weighted * gains[i]).sum())
+    return policy.visits(net.astype(float))
+
+
+def _curvature(part: SceneEvidence, jet: Jet, policy: Policy, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(k, k) covariance of the steps' gradient, and what the bend of the terms adds to the Hessian less of it."""
+    weight = policy.probability * _flow(part, policy)[:, None]
+    expected = _covariance(jet.first, policy, slope, weight)
+    bend = np.zeros_like(expected)
     for (i, j), second in jet.second.items():
-        demonstrated = float(np.broadcast_to(second, (lattice.size, 8))[part.state, part.move].sum())
-        expected = float((weight * second).sum())
-        result[i, j] += demonstrated - expected
-        if i != j:
-            result[j, i] = result[i, j]
-    return result
+        demonstrated = _at_steps([second], part).sum()
+        bend[i, j] = bend[j, i] = demonstrated - float((weight * second).sum())
+    return expected, bend
+
+
+def _covariance(features: Sequence[FloatArray], policy: Policy, slope: FloatArray, weight: FloatArray) -> FloatArray:
+    """(k, k) sum over states and moves of weight times what the move changes of the features' expected sums.
+
+    Args:
+        features: k arrays, each broadcastable to (n, 8).
+        policy: The policy.
+        slope: (n, k) expected sums Y of the features from every state to the goal.
+        weight: (n, 8) expected number of times that each step is taken.
+    """
+    neighbours, k = policy.lattice.neighbours, len(features)
+    gains = np.empty((k, *weight.shape))
+    for j, (feature, one) in enumerate(zip(features, np.ascontiguousarray(slope.T), strict=True)):
+        np.take(one, neighbours, out=gains[j], mode="wrap")  # anything where no move is possible: it weighs 0
+        gains[j] -= one[:, None]
+        gains[j] += feature
+    flat, weighted = gains.reshape(k, -1), (gains * weight).reshape(k, -1)
+    # Sums of few long products: a linear algebra library would share them out to threads, at a loss.
+    sums = np.array([[np.einsum("i,i->", flat[i], weighted[j]) for j in range(k)] for i in range(k)])
+    return np.asarray((sums + sums.T) / 2)

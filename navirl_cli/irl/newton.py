@@ -5,7 +5,7 @@ objective gains by it; the trust-region step is exact (one small eigenvalue prob
 curvature are followed and not stuck at.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,11 @@ MAX_ITERATIONS = 200
 #: The Newton step promises less than this gain, in nats: the optimum is reached for every purpose.
 GAIN_TOLERANCE = 1e-9
 MAX_RADIUS = 16.0
+#: Nats below a known maximum within which it is asked whether the search is bound for it; how far from it, in every
+#: variable, and nats from its value it may seem to land.
+NEAR, PLACE, SAME = 50.0, 0.5, 0.5
+#: Share of the radius by which a step to the region's edge may fall short of it.
+EDGE = 1e-10
 #: A region this small (in units of the variables) means that the objective contradicts its derivatives.
 MIN_RADIUS = 1e-12
 
@@ -33,50 +38,55 @@ class Point:
 
 @dataclass(frozen=True)
 class Maximum:
-    """Where the search ended."""
+    """Where a search ended."""
 
     best: Point
     #: True where the promised gain fell below the tolerance.
     converged: bool
-    evaluations: int
-    #: Accepted points in order, the start first.
-    path: tuple[Point, ...]
+    #: True where the last place that was tried does not exist.
+    blocked: bool
+    #: (i, k) accepted places and (i,) values there, the start first.
+    path: FloatArray
+    path_value: FloatArray
 
 
 def maximise(
     objective: Callable[[FloatArray], Point],
-    start: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    start: Point,
+    bounds: tuple[FloatArray, FloatArray],
     free: NDArray[np.bool_],
-    progress: Callable[[Point], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    known: Sequence[Point] = (),
 ) -> Maximum:
     """Climb to a local maximum.
 
     Args:
         objective: Value, gradient and Hessian at (k,) variables; value -inf where it does not exist.
-        start: (k,) within the bounds; the objective must exist there.
-        lower: (k,) bounds.
-        upper: (k,) bounds.
+        start: Within the bounds; the objective must exist there.
+        bounds: (k,) lower and upper ones.
         free: (k,) variables that may move.
-        progress: Called with every accepted point.
+        progress: Called with every accepted value.
+        known: Maxima found before; the search ends, short of convergence, where it is bound for one of them.
 
     Returns:
         The maximum and the way to it.
     """
-    here = objective(np.clip(start, lower, upper))
-    path, evaluations, radius = [here], 1, 1.0
+    lower, upper = bounds
+    here, path, radius = start, [start], 1.0
+    converged = blocked = False
     while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
+        if any(_bound_for(here, top, bounds, free) for top in known):
+            break
         step = _step(here, lower, upper, free, radius)
         promised = _promise(here, step)
         # A step that the region holds back promises little because it is short, not because the top is near.
         if promised < GAIN_TOLERANCE and np.linalg.norm(step) < 0.9 * radius:
-            return Maximum(here, True, evaluations, tuple(path))
+            converged = True
+            break
         # A variable that meets its bound stands on it, not a rounding beside it.
         onto = np.where(step == lower - here.x, lower, np.where(step == upper - here.x, upper, here.x + step))
         there = objective(onto)
-        evaluations += 1
-        gained = there.value - here.value
+        gained, blocked = there.value - here.value, there.value == -np.inf
         if not gained > 0.25 * promised:
             radius = 0.25 * float(np.linalg.norm(step))
         elif gained > 0.75 * promised and np.linalg.norm(step) > 0.8 * radius:
@@ -87,8 +97,19 @@ def maximise(
             here = there
             path.append(here)
             if progress is not None:
-                progress(here)
-    return Maximum(here, False, evaluations, tuple(path))
+                progress(here.value)
+    way = np.array([point.x for point in path]), np.array([point.value for point in path])
+    return Maximum(here, converged, blocked, *way)
+
+
+def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
+    """Whether a full step from here lands on a known maximum, by place and by value."""
+    if here.value < top.value - NEAR:
+        return False
+    step = _step(here, *bounds, free, MAX_RADIUS)
+    away = here.x + step - top.x
+    # In units, too: where the top is flat, places far apart are not told apart by the value.
+    return bool(np.abs(away).max() < PLACE) and abs(here.value + _promise(here, step) - top.value) < SAME
 
 
 def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bool_], radius: float) -> FloatArray:
@@ -140,10 +161,13 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
     for _ in range(80):
         middle = floor + np.sqrt((low - floor) * (high - floor)) if low > floor else 0.5 * (low + high)
         step = slope / (middle - curvature)
-        if float(step @ step) > radius**2:
+        length = float(np.sqrt(step @ step))
+        if length > radius:
             low = middle
         else:
             high = middle
+            if length > radius * (1 - EDGE):
+                break
     step = slope / (high - curvature)
     rest = radius**2 - float(step @ step)
     if steepest >= 0 and rest > 0 and abs(slope[-1]) < 1e-12:

@@ -7,8 +7,8 @@ import numpy as np
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.demos.rasterize import rasterize
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
-from navirl_cli.irl.likelihood import evidence_of
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m
 from navirl_cli.simulation import person

@@ -1,0 +1,101 @@
+"""The bias that maximum likelihood has with few demonstrations, to first order in one over their number.
+
+D. R. Cox, E. J. Snell, A general definition of residuals, Journal of the Royal Statistical Society B 30 (1968), Sec. 3,
+as G. M. Cordeiro and R. Klein write it (Statistics and Probability Letters 19, 1994):
+
+    bias_s = 1/2 sum_ijk I^si I^jk (kappa_ij,k - dI_ij/dtheta_k),
+
+with I the expected information, I^ij its inverse, and kappa_ij,k the mean of second derivative times first of the
+log-likelihood. A path's log-likelihood is its reward less a function of the parameters, so that kappa_ij,k is the
+covariance of d2r/dij and dr/dk summed along paths, of the same form as I and as exactly known.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.errors import RewardError
+from navirl_cli.irl.evidence import Evidence
+from navirl_cli.irl.fit import PAPER_L2, Fit
+from navirl_cli.irl.likelihood import log_likelihood, path_covariance
+from navirl_cli.irl.prior import Prior
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.status import Status
+
+#: Step of the difference quotients of I, in standard errors.
+STEP = 0.02
+TOO_FEW = "the demonstrations are too few for it: the correction would go too far"
+
+
+def first_order_bias(evidence: Evidence, reward: Reward, told: NDArray[np.bool_]) -> FloatArray:
+    """By how much a fit is expected to miss the truth on average, were this the truth.
+
+    Args:
+        evidence: Whole paths of demonstrations; their starts and number count, not where they lead.
+        reward: The reward; k parameters.
+        told: (k,) parameters that are fitted; the others stand still.
+
+    Returns:
+        (k,) bias in the parameters' units, 0 for those that stand still. Within a fraction of a standard error it is
+        what a fit should be corrected by; where it exceeds one, the demonstrations are too few for it.
+
+    Raises:
+        InfinitePartitionError: The partition function is infinite at the reward or close to it.
+    """
+    k = len(reward.theta)
+    covariance, pairs = path_covariance(evidence, reward)
+    fitted = np.flatnonzero(told)
+    block = np.ix_(fitted, fitted)
+    inverse = np.linalg.inv(covariance[:k, :k][block])
+    mixed = np.zeros((k, k, k))
+    for number, (i, j) in enumerate(pairs):
+        mixed[i, j] = mixed[j, i] = covariance[k + number, :k]
+    slope = np.zeros((k, k, k))
+    for j, error in zip(fitted.tolist(), np.sqrt(np.diag(inverse)).tolist(), strict=True):
+        slope[:, :, j] = _information_slope(evidence, reward, j, STEP * error)
+    inner = (mixed - slope)[np.ix_(fitted, fitted, fitted)]
+    bias = np.zeros(k)
+    bias[fitted] = 0.5 * np.einsum("si,jk,ijk->s", inverse, inverse, inner)
+    return bias
+
+
+def corrected(evidence: Evidence, found: Fit) -> Fit:
+    """A fit to whole paths less its own bias; errors are those of the fit.
+
+    Raises:
+        RewardError: The fit is not at a maximum of the likelihood, or its bias exceeds a standard error, so that the
+            demonstrations are too few for a correction to first order.
+    """
+    if found.prior is not None or found.l2 > PAPER_L2 or found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+        raise RewardError("--correct-bias: known for maxima of the likelihood only, without a prior or a larger --l2")
+    told = np.isfinite(found.standard_errors)
+    try:
+        bias = first_order_bias(evidence, found.reward, told)
+        reward = Reward(tuple((np.array(found.reward.theta) - bias).tolist()), found.reward.terms)
+        value = log_likelihood(evidence, reward)
+    except RewardError as error:
+        raise RewardError(f"--correct-bias: {TOO_FEW} (beyond the bounds of a reward)") from error
+    large = [
+        parameter.name
+        for parameter, one, spread, tells in zip(reward.parameters, bias, found.standard_errors, told, strict=True)
+        if tells and abs(one) > spread
+    ]
+    if large:
+        raise RewardError(f"--correct-bias: {TOO_FEW} (by more than a standard error in {', '.join(large)})")
+    regulariser = Prior.l2(reward.parameters, found.l2).log_density(np.array(reward.theta))
+    return replace(found, reward=reward, log_likelihood=value, objective=value + regulariser, bias=bias)
+
+
+def _information_slope(evidence: Evidence, reward: Reward, number: int, step: float) -> FloatArray:
+    """(k, k) derivative of the expected information by one parameter, from the inside of its bounds."""
+    parameter, here = reward.parameters[number], reward.theta[number]
+    ends = max(here - step, parameter.lower), min(here + step, parameter.upper)
+    k = len(reward.theta)
+    low, high = (
+        path_covariance(evidence, Reward((*reward.theta[:number], end, *reward.theta[number + 1 :]), reward.terms))[0]
+        for end in ends
+    )
+    slope: FloatArray = (high - low)[:k, :k] / (ends[1] - ends[0])
+    return slope

@@ -1,0 +1,114 @@
+"""How sure a fit is, by fitting again with participants drawn anew (Efron and Tibshirani 1993, Sec. 13.3)."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.evidence import Evidence
+from navirl_cli.irl.fit import Fit, fit
+from navirl_cli.irl.series import InfinitePartitionError
+from navirl_cli.irl.status import Status
+from navirl_cli.parallel import map_in_order
+
+#: Replicates that one process computes between two reports of progress.
+BATCH = 5
+
+
+@dataclass(frozen=True)
+class Bootstrap:
+    """Fits of the same number of participants, drawn with replacement."""
+
+    #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not tell one.
+    theta: FloatArray
+    #: Replicates without a fit, and those whose search did not reach a maximum (these count, as far as they came).
+    failed: int
+    stopped_early: int
+    seed: int
+
+    @property
+    def told(self) -> IntArray:
+        """(k,) number of replicates that tell each parameter."""
+        return np.asarray(np.isfinite(self.theta).sum(axis=0))
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """(k,) standard deviations over the replicates that tell the parameter; NaN where fewer than two do."""
+        columns = [column[np.isfinite(column)] for column in self.theta.T]
+        return np.array([column.std(ddof=1) if len(column) > 1 else np.nan for column in columns])
+
+    def interval(self, level: float = 0.95) -> FloatArray:
+        """(2, k) percentile interval over the replicates that tell the parameter; NaN where fewer than two do."""
+        ends = 50 * (1 - level), 50 * (1 + level)
+        columns = [column[np.isfinite(column)] for column in self.theta.T]
+        return np.array([np.percentile(c, ends) if len(c) > 1 else (np.nan, np.nan) for c in columns]).T
+
+
+def bootstrap(
+    evidence: Evidence,
+    found: Fit,
+    count: int,
+    seed: int,
+    *,
+    executor: Executor | None = None,
+    progress: Callable[[int, str], None] | None = None,
+) -> Bootstrap:
+    """Fit again with participants drawn with replacement; all demonstrations of one come together.
+
+    Args:
+        evidence: What was learnt from.
+        found: The fit of it; every replicate starts there, with its prior and regulariser.
+        count: Number of replicates.
+        seed: Of the draws.
+        executor: Where to compute; by default local processes.
+        progress: Called with the number of replicates done.
+
+    Returns:
+        The replicates.
+
+    Raises:
+        DemonstrationError: There is one participant only, or fewer than two replicates gave a fit.
+    """
+    names = evidence.several_people("--bootstrap")
+    rng = np.random.default_rng(seed)
+    drawn = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=count)
+    member = np.array([[name == participant for participant in evidence.participants] for name in names], dtype=int)
+    batches = np.array_split(drawn @ member, max(1, -(-count // BATCH)))
+    results: list[Fit | None] = []
+    for batch in map_in_order(partial(_refit, evidence, found), batches, executor):
+        results.extend(batch)
+        if progress is not None:
+            progress(len(results), "")
+    fits = [result for result in results if result is not None]
+    if len(fits) < 2:
+        raise DemonstrationError(f"--bootstrap: of {count} draws of participants fewer than two could be learnt from")
+    return Bootstrap(
+        theta=np.array([np.where(again.identified, again.reward.theta, np.nan) for again in fits]),
+        failed=count - len(fits),
+        stopped_early=sum(again.status in {Status.STOPPED_EARLY, Status.INFINITE} for again in fits),
+        seed=seed,
+    )
+
+
+def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
+    """Fits for rows of counts by demonstration."""
+    results: list[Fit | None] = []
+    for counts in batch:
+        try:
+            again = fit(
+                evidence.repeated(counts),
+                found.reward,
+                found.l2,
+                prior=found.prior,
+                method=found.method,
+                restarts=False,
+            )
+        except (InfinitePartitionError, DemonstrationError):
+            results.append(None)
+        else:
+            results.append(again)
+    return results

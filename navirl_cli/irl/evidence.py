@@ -1,0 +1,148 @@
+"""What is learnt from: the demonstrated steps, by scene."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import MOVES, IntArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.scene import Scene, scenes_of
+
+
+@dataclass(frozen=True)
+class SceneEvidence:
+    """All steps that were demonstrated in one scene."""
+
+    scene: Scene
+    #: (m,) state that each step leaves, and number of its move.
+    state: IntArray
+    move: IntArray
+    #: (m,) number of the demonstration (in the whole list) that each step belongs to, and of the step on its path.
+    owner: IntArray
+    number: IntArray
+
+    @property
+    def target(self) -> IntArray:
+        """(m,) state that each step leads to."""
+        target: IntArray = self.scene.lattice.neighbours[self.state, self.move]
+        return target
+
+    def taken(self, steps: IntArray | NDArray[np.bool_]) -> "SceneEvidence":
+        """Some of the steps, by number or mask; a step named twice counts twice."""
+        arrays = {name: getattr(self, name)[steps] for name in ("state", "move", "owner", "number")}
+        return replace(self, **arrays)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Demonstrated steps, by scene; repeated steps count each time."""
+
+    scenes: tuple[SceneEvidence, ...]
+    #: By demonstration, also of those none of whose steps is left.
+    participants: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of demonstrations in the list that owners refer to."""
+        return len(self.participants)
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return sum(len(part.state) for part in self.scenes)
+
+    @property
+    def owners(self) -> IntArray:
+        """Numbers of the demonstrations of which there is a step."""
+        return np.unique(np.concatenate([part.owner for part in self.scenes]))
+
+    @property
+    def people(self) -> list[str]:
+        """Participants of whose demonstrations there is a step, in order of their names."""
+        return sorted({self.participants[owner] for owner in self.owners})
+
+    def several_people(self, option: str) -> list[str]:
+        """The participants, where there are several.
+
+        Raises:
+            DemonstrationError: There is one only; the option needs more.
+        """
+        if len(self.people) < 2:
+            raise DemonstrationError(
+                f"{option} needs several participants, and all demonstrations are of {self.people[0]}; "
+                "add logs of others"
+            )
+        return self.people
+
+    def only(self, masks: Sequence[NDArray[np.bool_]]) -> "Evidence":
+        """Some of the steps.
+
+        Args:
+            masks: By demonstration, (k - 1,) whether the step from each cell to the next counts.
+
+        Raises:
+            DemonstrationError: No step is left.
+        """
+        starts = np.concatenate([[0], np.cumsum([len(mask) for mask in masks])])
+        chosen = np.concatenate(masks)
+        return self._of(part.taken(chosen[starts[part.owner] + part.number]) for part in self.scenes)
+
+    def repeated(self, counts: IntArray) -> "Evidence":
+        """All steps of every demonstration as often as a (demonstrations,) count says; owners keep their numbers.
+
+        Raises:
+            DemonstrationError: No step is left.
+        """
+        return self._of(part.taken(np.repeat(np.arange(len(part.owner)), counts[part.owner])) for part in self.scenes)
+
+    def _of(self, parts: Iterable[SceneEvidence]) -> "Evidence":
+        left = tuple(part for part in parts if len(part.state))
+        if not left:
+            raise DemonstrationError("no step is left to learn from")
+        return replace(self, scenes=left)
+
+    def uniform_log_likelihood(self) -> float:
+        """Log-likelihood of the steps when every possible move is equally likely."""
+        return -sum(float(np.log(part.scene.lattice.possible[part.state].sum(axis=1)).sum()) for part in self.scenes)
+
+
+def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
+    """Collect the steps of demonstrations by scene.
+
+    Raises:
+        SceneError: A demonstration's scene has no way from start to goal.
+        DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
+    """
+    if not demonstrations:
+        raise DemonstrationError("no demonstration to learn from: check --condition, --cycle and --only-corrected")
+    steps: dict[int, list[tuple[IntArray, IntArray, int]]] = {}
+    scenes = scenes_of(demonstrations)
+    for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):
+        states = scene.lattice.states_of(demonstration.cells)
+        if (states[:-1] == scene.goal).any():
+            raise DemonstrationError(
+                f"demonstration {demonstration.id}: its path passes the goal's cell before it ends there; "
+                "end the trial at the first arrival"
+            )
+        moves = moves_along(demonstration.cells)
+        steps.setdefault(id(scene), []).append((states[:-1], moves, owner))
+    parts = []
+    for scene in {id(scene): scene for scene in scenes}.values():
+        own = steps[id(scene)]
+        owners = np.concatenate([np.full(len(states), owner) for states, _, owner in own])
+        numbers = np.concatenate([np.arange(len(states)) for states, _, _ in own])
+        state, move = (np.concatenate([step[i] for step in own]) for i in (0, 1))
+        parts.append(SceneEvidence(scene, state, move, owners, numbers))
+    return Evidence(tuple(parts), tuple(d.participant for d in demonstrations))
+
+
+def moves_along(cells: IntArray) -> IntArray:
+    """Numbers of the moves (rows of MOVES) between successive (k, 2) cells."""
+    difference = np.diff(cells, axis=0)
+    number = np.full((3, 3), -1)
+    number[MOVES[:, 0] + 1, MOVES[:, 1] + 1] = np.arange(8)
+    moves: IntArray = number[difference[:, 0] + 1, difference[:, 1] + 1]
+    return moves

@@ -1,0 +1,117 @@
+"""What a fit maximises: log-likelihood and prior, as a function of parameters divided by their scales."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.irl.evidence import Evidence
+from navirl_cli.irl.likelihood import likelihood, value_and_gradient
+from navirl_cli.irl.newton import Point
+from navirl_cli.irl.prior import Prior
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.series import InfinitePartitionError
+from navirl_cli.irl.uncertainty import NO_INFORMATION
+
+
+@dataclass
+class Objective:
+    """Log-likelihood plus log prior density; -inf where the partition function is infinite."""
+
+    evidence: Evidence
+    #: Its terms; its parameters are the first start.
+    initial: Reward
+    #: All that is known besides the demonstrations, and the regulariser's part of it.
+    prior: Prior
+    regulariser: Prior
+    #: Number of calls so far.
+    evaluations: int = field(default=0, init=False)
+    #: Scores by demonstration wherever it was called.
+    _scores: dict[bytes, FloatArray] = field(default_factory=dict, init=False)
+
+    @property
+    def scale(self) -> FloatArray:
+        """(k,) scales of the parameters."""
+        return np.array([parameter.scale for parameter in self.initial.parameters])
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """(k,) lower and upper ones."""
+        low, high = (self.to_units([getattr(p, side) for p in self.initial.parameters]) for side in ("lower", "upper"))
+        return low, high
+
+    def to_units(self, theta: Sequence[float]) -> FloatArray:
+        """(k,) parameters divided by their scales."""
+        return np.asarray(theta, dtype=float) / self.scale
+
+    def reward(self, x: FloatArray) -> Reward:
+        """The reward at (k,) variables."""
+        # Dividing and multiplying by the scale may leave a bound by a rounding.
+        theta = (
+            min(max(value, p.lower), p.upper)
+            for value, p in zip((x * self.scale).tolist(), self.initial.parameters, strict=True)
+        )
+        return Reward(tuple(theta), self.initial.terms)
+
+    def __call__(self, x: FloatArray) -> Point:
+        """Value, gradient and Hessian at (k,) variables."""
+        self.evaluations += 1
+        theta = x * self.scale
+        try:
+            found = likelihood(self.evidence, self.reward(x))
+        except InfinitePartitionError:
+            return Point(x, -np.inf, np.zeros_like(x), np.zeros((len(x), len(x))))
+        self._scores[x.tobytes()] = found.scores
+        return Point(
+            x,
+            found.value + self.prior.log_density(theta),
+            (found.gradient + self.prior.gradient(theta)) * self.scale,
+            (found.hessian - self.prior.precision) * np.outer(self.scale, self.scale),
+        )
+
+    def scores(self, x: FloatArray) -> FloatArray:
+        """(demonstrations, k) gradients of the demonstrations' log-likelihoods, in parameters, where it was called."""
+        return self._scores[x.tobytes()]
+
+    def slope(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Value and gradient alone."""
+        self.evaluations += 1
+        theta = x * self.scale
+        try:
+            value, gradient = value_and_gradient(self.evidence, self.reward(x))
+        except InfinitePartitionError:
+            return -np.inf, np.zeros_like(x)
+        return value + self.prior.log_density(theta), (gradient + self.prior.gradient(theta)) * self.scale
+
+    def log_likelihood(self, x: FloatArray, value: float) -> float:
+        """The log-likelihood in a value at (k,) variables."""
+        return value - self.prior.log_density(x * self.scale)
+
+    def information(self, point: Point) -> tuple[FloatArray, FloatArray]:
+        """(k, k) observed information at a point, and the regulariser's part of it."""
+        return -point.hessian, self.regulariser.precision * np.outer(self.scale, self.scale)
+
+    def identified(self, point: Point) -> NDArray[np.bool_]:
+        """(k,) which parameters change the value at all, the regulariser aside: slope or a curvature does not vanish.
+
+        Mixed curvatures count, because at a_p = 0 it is the only one that tells sigma_p.
+        """
+        information, regulariser = self.information(point)
+        slope = np.abs(point.gradient - self.regulariser.gradient(point.x * self.scale) * self.scale)
+        curvature = np.abs(information - regulariser).max(axis=1)
+        told: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
+        return told
+
+    def starts(self, first: Point) -> list[FloatArray]:
+        """Other starts than the first: with the restarts of those parameters that have some."""
+        starts = []
+        for number in range(max((len(parameter.restarts) for parameter in self.initial.parameters), default=0)):
+            x = first.x.copy()
+            for j, parameter in enumerate(self.initial.parameters):
+                if number < len(parameter.restarts):
+                    x[j] = parameter.restarts[number] / parameter.scale
+            if (x != first.x).any():
+                starts.append(x)
+        return starts

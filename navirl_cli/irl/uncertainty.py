@@ -1,0 +1,95 @@
+"""How sure a fit is: from the curvature at its maximum, and from how participants differ."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import FloatArray
+
+#: Information, in squared units of a parameter's scale, below which nothing is said: an error of 1000 scales.
+NO_INFORMATION = 1e-6
+
+
+def observed(
+    information: FloatArray, regulariser: FloatArray, told: NDArray[np.bool_]
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Covariance from the observed information, and which parameters take part in a direction that nothing tells.
+
+    Whether a direction is told is asked without what the regulariser adds, which says nothing of the world.
+
+    Args:
+        information: (k, k) less the Hessian of what was maximised, parameters in units of their scales.
+        regulariser: (k, k) the regulariser's share of it.
+        told: (k,) parameters that are inside their bounds and change the likelihood.
+
+    Returns:
+        (k, k) inverse of the information where there is any, else NaN; (k,) blind parameters.
+    """
+    covariance = np.full(information.shape, np.nan)
+    blind = np.zeros_like(told)
+    if told.any():
+        block = np.ix_(told, told)
+        values, directions = np.linalg.eigh(information[block])
+        plain = np.einsum("ij,ik,kj->j", directions, (information - regulariser)[block], directions)
+        seen = plain > NO_INFORMATION
+        found = (directions[:, seen] / values[seen]) @ directions[:, seen].T
+        covariance[block] = found
+        # The variance along an untold direction is at least so much; whose own is smaller than its part of it is blind.
+        blind[told] = (directions[:, ~seen] ** 2).sum(axis=1) / NO_INFORMATION > np.diag(found)
+        covariance[blind] = covariance[:, blind] = np.nan
+    return covariance, blind
+
+
+def clustered(
+    covariance: FloatArray, scores: FloatArray, participants: Sequence[str], prior: FloatArray | None = None
+) -> FloatArray | None:
+    """Sandwich covariance that does not take a participant's demonstrations for independent of each other.
+
+    A S A with A the covariance from the observed information and S the scatter of the participants' summed scores,
+    times c/(c - 1) for c participants (Liang and Zeger 1986, Biometrika 73:13; White 1982, Econometrica 50:1).
+
+    Args:
+        covariance: (k, k), NaN for parameters without one.
+        scores: (demonstrations, k) gradient of each demonstration's log-likelihood at the maximum.
+        participants: By demonstration.
+        prior: (k, k) precision of what was known before; its mean, too, is known by chance only.
+
+    Returns:
+        (k, k), NaN as in ``covariance``; None for a single participant.
+    """
+    names = sorted(set(participants))
+    if len(names) < 2:
+        return None
+    member = np.array([[name == participant for participant in participants] for name in names], dtype=float)
+    sums = member @ scores
+    # At a penalised maximum they add up to the penalty's pull, which is no scatter.
+    sums = sums - sums.mean(axis=0)
+    scatter = sums.T @ sums * len(names) / (len(names) - 1)
+    if prior is not None:
+        scatter = scatter + prior
+    known = np.isfinite(np.diag(covariance))
+    bread = covariance[np.ix_(known, known)]
+    robust = np.full_like(covariance, np.nan)
+    robust[np.ix_(known, known)] = bread @ scatter[np.ix_(known, known)] @ bread
+    return robust
+
+
+def correlation(covariance: FloatArray) -> FloatArray:
+    """(k, k) correlations, NaN where there is no covariance."""
+    error = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore"):
+        matrix: FloatArray = covariance / np.outer(error, error)
+    return matrix
+
+
+def condition_number(covariance: FloatArray) -> float:
+    """Largest over least eigenvalue of the correlations: 1 for parameters told apart, large where only sums are told.
+
+    Of the correlations, because that of a covariance depends on the parameters' units.
+    """
+    known = np.isfinite(np.diag(covariance))
+    if not known.any():
+        return np.nan
+    values = np.linalg.eigvalsh(correlation(covariance[np.ix_(known, known)]))
+    return float(values[-1] / values[0]) if values[0] > 0 else np.inf

@@ -1,0 +1,159 @@
+"""How well a reward foretells people it was not learnt from: one participant after another is left out."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.irl.evidence import Evidence
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.personal_space import PersonalSpace
+from navirl_cli.irl.terms.step_length import StepLength
+from navirl_cli.irl.terms.term import Parameter
+from navirl_cli.parallel import map_in_order
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Held-out log-likelihoods, and features demonstrated and expected, of p left-out participants."""
+
+    participants: tuple[str, ...]
+    #: (p,) steps of each.
+    steps: IntArray
+    #: By model (learnt, no person, shortest path, uniform): (p,) held-out log-likelihood, nats.
+    log_likelihoods: dict[str, FloatArray]
+    #: The learnt model's k parameters.
+    parameters: tuple[Parameter, ...]
+    #: (p, k) sums of dr/dtheta over the left-out steps: demonstrated, and expected of what was learnt from the others;
+    #: and the standard error of their difference, from the chance in the paths and in what was learnt.
+    demonstrated: FloatArray
+    expected: FloatArray
+    deviation: FloatArray
+    #: (p, k) whether the others tell the parameter; where they do not, it stood where the fits start.
+    identified: NDArray[np.bool_]
+    #: (p,) how the learnt model's fit to the others ended.
+    statuses: tuple[Status, ...]
+
+    def per_step(self, model: str) -> float:
+        """Held-out log-likelihood per step over all participants."""
+        return float(self.log_likelihoods[model].sum() / self.steps.sum())
+
+    @property
+    def mismatch(self) -> FloatArray:
+        """(p, k) |f_demo - E f| in standard errors: about 1 where people differ no more than paths of one person do."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.abs(self.demonstrated - self.expected) / self.deviation)
+
+
+@dataclass(frozen=True)
+class _LeftOut:
+    """What one left-out participant says."""
+
+    steps: int
+    log_likelihoods: dict[str, float]
+    demonstrated: FloatArray
+    expected: FloatArray
+    deviation: FloatArray
+    identified: NDArray[np.bool_]
+    status: Status
+
+
+def cross_validate(
+    evidence: Evidence,
+    initial: Reward,
+    l2: float,
+    *,
+    executor: Executor | None = None,
+    progress: Callable[[int, str], None] | None = None,
+) -> Validation:
+    """Learn from all participants but one and ask how likely that one's steps are; so for each.
+
+    Beside the reward stand models that must be beaten: the same without the person, the cost of way alone (the shortest
+    path with some noise), and equally likely moves.
+
+    Args:
+        evidence: Demonstrations of at least two participants.
+        initial: Terms, and where the fits start.
+        l2: Regulariser of the fits.
+        executor: Where to compute; by default local processes.
+        progress: Called with the number of participants done.
+
+    Returns:
+        The held-out results.
+
+    Raises:
+        DemonstrationError: There is one participant only.
+        InfinitePartitionError: A learnt reward has no policy in a left-out scene.
+    """
+    names = evidence.several_people("--cross-validate")
+    results = []
+    for result in map_in_order(partial(_leave_out, evidence, _models(initial), l2), names, executor):
+        results.append(result)
+        if progress is not None:
+            progress(len(results), names[len(results) - 1])
+    return Validation(
+        participants=tuple(names),
+        steps=np.array([one.steps for one in results]),
+        log_likelihoods={
+            model: np.array([one.log_likelihoods[model] for one in results]) for model in results[0].log_likelihoods
+        },
+        parameters=initial.parameters,
+        demonstrated=np.array([one.demonstrated for one in results]),
+        expected=np.array([one.expected for one in results]),
+        deviation=np.array([one.deviation for one in results]),
+        identified=np.array([one.identified for one in results]),
+        statuses=tuple(one.status for one in results),
+    )
+
+
+def _models(initial: Reward) -> dict[str, Reward]:
+    """The reward and what it is compared with, by name; the first is the reward."""
+    return {
+        "learnt": initial,
+        "no person": _without(initial, lambda term: not isinstance(term, PersonalSpace)),
+        "shortest path": _without(initial, lambda term: isinstance(term, StepLength)),
+    }
+
+
+def _without(initial: Reward, keep: Callable[[object], bool]) -> Reward:
+    """The reward with some of its terms."""
+    theta: list[float] = []
+    at = 0
+    for term in initial.terms:
+        count = len(term.parameters)
+        if keep(term):
+            theta.extend(initial.theta[at : at + count])
+        at += count
+    return Reward(tuple(theta), tuple(term for term in initial.terms if keep(term)))
+
+
+def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: str) -> _LeftOut:
+    """Fit every model without one participant, and ask it for that one."""
+    others = np.array([participant != name for participant in evidence.participants], dtype=int)
+    learning, held_out = evidence.repeated(others), evidence.repeated(1 - others)
+    fits = {model: fit(learning, initial, l2) for model, initial in models.items()}
+    values = {model: log_likelihood(held_out, found.reward) for model, found in fits.items()}
+    values["uniform"] = held_out.uniform_log_likelihood()
+    learnt = next(iter(fits.values()))
+    found, demonstrated = likelihood(held_out, learnt.reward), feature_sums(held_out, learnt.reward)
+    # The gradient is the difference of the sums; it varies with the paths, and with what was learnt by its derivative.
+    covariance = np.nan_to_num(learnt.covariance)
+    spread = found.information + found.information @ covariance @ found.information
+    # By a parameter that the others do not tell nothing is foretold.
+    deviation = np.where(learnt.identified, np.sqrt(np.diag(spread)), np.nan)
+    return _LeftOut(
+        steps=held_out.steps,
+        log_likelihoods=values,
+        demonstrated=demonstrated,
+        expected=demonstrated - found.gradient,
+        deviation=deviation,
+        identified=learnt.identified,
+        status=learnt.status,
+    )
