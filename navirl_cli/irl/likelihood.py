@@ -217,10 +217,13 @@ def _covariance(features: Sequence[FloatArray], policy: Policy, slope: FloatArra
     neighbours, k = policy.lattice.neighbours, len(features)
     gains = np.empty((k, *weight.shape))
     for j, (feature, one) in enumerate(zip(features, np.ascontiguousarray(slope.T), strict=True)):
-        np.take(one, neighbours, out=gains[j], mode="wrap")  # anything where no move is possible: it weighs 0
+        np.take(one, neighbours, out=gains[j], mode="clip")  # anything where no move is possible: it weighs 0
         gains[j] -= one[:, None]
         gains[j] += feature
     flat, weighted = gains.reshape(k, -1), (gains * weight).reshape(k, -1)
     # Sums of few long products: a linear algebra library would share them out to threads, at a loss.
-    sums = np.array([[np.einsum("i,i->", flat[i], weighted[j]) for j in range(k)] for i in range(k)])
-    return np.asarray((sums + sums.T) / 2)
+    sums = np.zeros((k, k))
+    for i in range(k):
+        for j in range(i + 1):
+            sums[i, j] = sums[j, i] = np.einsum("i,i->", flat[i], weighted[j])
+    return sums

@@ -16,11 +16,13 @@ from navirl_cli.demos.grid import FloatArray
 MAX_ITERATIONS = 200
 #: The Newton step promises less than this gain, in nats: the optimum is reached for every purpose.
 GAIN_TOLERANCE = 1e-9
+#: Of a first search, and of others, which are to learn soon whether they are bound for the same.
+FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
 MAX_RADIUS = 16.0
 #: Nats below a known maximum within which it is asked whether the search is bound for it; how far from it, in every
-#: variable, and nats from its value it may seem to land.
-NEAR, PLACE, SAME = 50.0, 0.5, 0.5
-#: Share of the radius by which a step to the region's edge may fall short of it.
+#: variable or in nats, and how many nats from its value it may seem to land.
+NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
+#: Share of the radius by which a step to the region's edge may miss it.
 EDGE = 1e-10
 #: A region this small (in units of the variables) means that the objective contradicts its derivatives.
 MIN_RADIUS = 1e-12
@@ -72,7 +74,7 @@ def maximise(
         The maximum and the way to it.
     """
     lower, upper = bounds
-    here, path, radius = start, [start], 1.0
+    here, path, radius = start, [start], AGAIN_RADIUS if known else FIRST_RADIUS
     converged = blocked = False
     while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
@@ -108,8 +110,10 @@ def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], f
         return False
     step = _step(here, *bounds, free, MAX_RADIUS)
     away = here.x + step - top.x
-    # In units, too: where the top is flat, places far apart are not told apart by the value.
-    return bool(np.abs(away).max() < PLACE) and abs(here.value + _promise(here, step) - top.value) < SAME
+    apart = -0.5 * float(away @ top.hessian @ away)
+    # In units or in nats: where the top is flat, places that are far apart may be the same for every purpose.
+    near = bool(np.abs(away).max() < PLACE) or 0 <= apart < ALIKE
+    return near and abs(here.value + _promise(here, step) - top.value) < SAME
 
 
 def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bool_], radius: float) -> FloatArray:
@@ -147,6 +151,8 @@ def _promise(here: Point, step: FloatArray) -> float:
 
 def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> FloatArray:
     """argmax of g.p + p.H.p/2 over |p| <= radius (Nocedal and Wright, Numerical Optimization, Sec. 4.3)."""
+    if radius <= 0:
+        return np.zeros_like(gradient)
     curvature, basis = np.linalg.eigh(hessian)
     slope = basis.T @ gradient
     steepest = float(curvature[-1])
@@ -155,19 +161,21 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
         if float(step @ step) <= radius**2:
             full: FloatArray = basis @ step
             return full
-    # |p(shift)| falls from infinity to 0 as the shift grows; bisect its logarithm above the largest curvature.
+    # |p(shift)| falls from infinity to 0 as the shift grows above the largest curvature; 1/|p| is all but linear in it.
     floor = max(steepest, 0.0)
     low, high = floor * (1 + 1e-15) + 1e-14, floor + float(np.linalg.norm(slope)) / max(radius, 1e-100) + 1e-12
+    shift = high
     for _ in range(80):
-        middle = floor + np.sqrt((low - floor) * (high - floor)) if low > floor else 0.5 * (low + high)
-        step = slope / (middle - curvature)
+        step = slope / (shift - curvature)
         length = float(np.sqrt(step @ step))
-        if length > radius:
-            low = middle
-        else:
-            high = middle
-            if length > radius * (1 - EDGE):
-                break
+        low, high = (shift, high) if length > radius else (low, shift)
+        if abs(length - radius) < EDGE * radius:
+            high = shift
+            break
+        if length > 0:  # a saddle has no slope
+            shift += (length / radius - 1) * length**2 / float(step @ (step / (shift - curvature)))
+        if not low < shift < high:
+            shift = floor + np.sqrt((low - floor) * (high - floor)) if low > floor else 0.5 * (low + high)
     step = slope / (high - curvature)
     rest = radius**2 - float(step @ step)
     if steepest >= 0 and rest > 0 and abs(slope[-1]) < 1e-12:
