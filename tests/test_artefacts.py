@@ -11,12 +11,14 @@ from jsonschema import Draft202012Validator
 from robot_log import Run, write_run
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
-from navirl_cli.artefacts.rewards import read_reward, read_reward_for, reward_document
+from navirl_cli.artefacts.rewards import Analyses, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import Input, read_json, schema_path, write_json
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.errors import ArtefactError
+from navirl_cli.irl.bootstrap import Bootstrap
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
-from navirl_cli.irl.likelihood import evidence_of
+from navirl_cli.irl.profile import Profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.logs.load import load_recording
 
@@ -156,17 +158,19 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
     edited(path, lambda d: d["parameters"][0].update(name="c9"))
-    with pytest.raises(ArtefactError, match="expected each parameter once, found c9, a_g, a_p, sigma_p"):
+    with pytest.raises(ArtefactError, match="expected the parameters c0, a_g, a_p, sigma_p, found c9"):
         read_reward(path)
     edited(path, lambda d: d["parameters"].append({**d["parameters"][0], "name": "c0"}))
-    with pytest.raises(ArtefactError, match="unknown parameter c9; the reward has c0, a_g, a_p, sigma_p"):
+    with pytest.raises(ArtefactError, match="found c9, a_g, a_p, sigma_p, c0"):
         read_reward(path)
-    edited(path, lambda d: d["parameters"].pop())
-    edited(path, lambda d: d["parameters"][0].update(name="c0", value=5.0))
+    edited(path, lambda d: (d["parameters"].pop(), d["parameters"][0].update(name="c0"), d["parameters"].reverse()))
+    with pytest.raises(ArtefactError, match="found sigma_p, a_p, a_g, c0"):  # whose rows are whose, one cannot know
+        read_reward(path)
+    edited(path, lambda d: (d["parameters"].reverse(), d["parameters"][0].update(value=5.0)))
     with pytest.raises(ArtefactError, match="c0 = 5 1/m is outside its bounds"):
         read_reward(path)
     edited(path, lambda d: (d["parameters"][0].update(value=-50.0), d["covariance"].pop()))
-    with pytest.raises(ArtefactError, match="covariance: expected 4 rows and columns"):
+    with pytest.raises(ArtefactError, match="covariance: expected 4 rows of 4 numbers"):
         read_reward(path)
 
 
@@ -192,3 +196,68 @@ def test_inputs_are_hashed(tmp_path):
     assert Input.of(path).sha256.startswith("ba7816bf8f01cfea")
     with pytest.raises(ArtefactError, match="cannot be read"):
         Input.of(tmp_path / "b")
+
+
+@pytest.fixture
+def with_profile(tmp_path, demonstration):
+    """A reward file with a profile and a bootstrap, forged: what its numbers are does not matter here."""
+    result = fit(evidence_of([demonstration]), Reward.named({}))
+    values = np.array([1.0, 2.0, 3.5])
+    profile = Profile("c0", values, np.array([-2.0, 0.0, -2.5]), np.ones((3, 4)), 0.95, 1.1, None)
+    drawn = Bootstrap(np.arange(8.0).reshape(2, 4), failed=1, stopped_early=0, seed=9)
+    path = tmp_path / "reward.json"
+    document = reward_document(result, [demonstration], [], 0.1, Analyses(drawn, (profile,)))
+    write_json(path, "reward", document, force=False)
+    return path, profile
+
+
+def test_profiles_and_bootstraps_come_back(with_profile):
+    path, profile = with_profile
+    (back,) = read_reward(path).profiles
+    for field in fields(profile):
+        old, new = getattr(profile, field.name), getattr(back, field.name)
+        assert (np.asarray(old) == np.asarray(new)).all(), field.name
+    drawn = read_json(path, "reward")["bootstrap"]
+    assert (drawn["theta"], drawn["failed"], drawn["seed"]) == ([[0, 1, 2, 3], [4, 5, 6, 7]], 1, 9)
+    assert drawn["standard_errors"] == pytest.approx([np.sqrt(8)] * 4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p: p["values"].pop(), "the profile of c0 needs ascending values"),
+        (lambda p: p["relative_log_likelihood"].append(0.0), "the profile of c0 needs ascending values"),
+        (lambda p: p["theta"].pop(), "the profile of c0 needs ascending values"),
+        (
+            lambda p: [p[key].clear() for key in ("values", "relative_log_likelihood", "theta")],
+            "needs ascending values",
+        ),
+        (lambda p: p.update(level=1.0), "breaks the schema of navirl reward at profiles/0/level"),
+        (lambda p: p.pop("upper"), "breaks the schema of navirl reward at profiles/0: 'upper' is a required"),
+    ],
+)
+def test_broken_profiles_are_refused(with_profile, change, message):
+    path, _ = with_profile
+    with pytest.raises(ArtefactError, match=message) as caught:
+        read_reward(edited(path, lambda document: change(document["profiles"][0])))
+    assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    "lines", [lambda d: d["covariance"], lambda d: d["profiles"][0]["theta"]], ids=["covariance", "profile"]
+)
+def test_rows_of_different_lengths_are_refused(with_profile, lines):
+    path, _ = with_profile
+    with pytest.raises(ArtefactError):
+        read_reward(edited(path, lambda document: lines(document)[0].pop()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda p: p["values"].__setitem__(1, None), lambda p: p["values"].reverse(), lambda p: p.update(parameter="c9")],
+    ids=["no number", "not ascending", "of no parameter"],
+)
+def test_profiles_that_are_none_are_refused(with_profile, change):
+    path, _ = with_profile
+    with pytest.raises(ArtefactError, match="profile"):
+        read_reward(edited(path, lambda document: change(document["profiles"][0])))

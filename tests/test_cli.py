@@ -100,6 +100,7 @@ def test_extract_prints_a_row_a_trial(navirl, tmp_path):
     document = read_json(Path("demos.json"), "demonstrations")
     assert document["inputs"][0]["file"] == "run.mcap"
     assert document["settings"]["split"] == "goal"
+    assert document["settings"]["rasterizer"] == "study"
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
 
 
@@ -250,6 +251,7 @@ def test_notes_go_to_stderr(navirl, tmp_path):
         ("extract", "a.mcap", "-o", "x.json", "--robot-radius", "nan"),
         ("extract", "a.mcap", "-o", "x.json", "--contact-force", "inf"),
         ("extract", "a.mcap", "-o", "x.json", "--resolution", "1e-9"),
+        ("extract", "a.mcap", "-o", "x.json", "--rasterizer", "nearest"),
         ("extract", "a.mcap", "-o", "x.json", "--goal", "inf,0"),
         ("fit", "demos.json", "-o", "r.json", "--l2", "inf"),
         ("fit", "demos.json", "-o", "r.json", "--init", "c0=-50,c0=-60"),
@@ -286,7 +288,7 @@ def test_fit_reports_and_writes_the_reward(navirl, work):
     result = navirl("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "-o", "reward.json")
     lines = result.stdout.splitlines()
     assert [line.split()[0] for line in lines[1:5]] == ["c0", "a_g", "a_p", "sigma_p"]
-    assert "status           converged" in result.stdout
+    assert "status            converged" in result.stdout
     document = read_json(Path("reward.json"), "reward")
     assert document["demonstrations"] == ["p01/3", "p01/4"]
     assert document["participants"] == ["p01"]

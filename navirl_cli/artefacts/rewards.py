@@ -2,18 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
+from navirl_cli.artefacts.store import Input, number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import ArtefactError, NavirlError
+from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.profile import Profile
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.status import Status
+from navirl_cli.irl.validation import Validation
 
 
 @dataclass(frozen=True)
@@ -27,41 +31,93 @@ class LearntReward:
     resolution_m: float
     #: Ids of the demonstrations that it was learnt from.
     demonstrations: tuple[str, ...]
+    #: How the fit ended.
+    status: Status
+    #: Profile likelihoods that were followed.
+    profiles: tuple[Profile, ...] = ()
+
+
+@dataclass(frozen=True)
+class Analyses:
+    """What was asked of a fit besides."""
+
+    bootstrap: Bootstrap | None = None
+    profiles: tuple[Profile, ...] = ()
+    validation: Validation | None = None
 
 
 def reward_document(
-    fit: Fit, demonstrations: Sequence[Demonstration], inputs: Sequence[Input], resolution_m: float
+    fit: Fit,
+    demonstrations: Sequence[Demonstration],
+    inputs: Sequence[Input],
+    resolution_m: float,
+    analyses: Analyses = Analyses(),
+    learnt_from: str = "all",
 ) -> dict[str, Any]:
-    """A fit as the content of a reward file."""
+    """A fit, and what was asked of it besides, as the content of a reward file.
+
+    Args:
+        fit: The fit.
+        demonstrations: Those that it was learnt from.
+        inputs: Files that were read.
+        resolution_m: Side of the cells, m.
+        analyses: What was asked besides.
+        learnt_from: "all" steps or those during "contact".
+    """
     return {
         "inputs": [vars(one) for one in inputs],
-        "parameters": [
-            {
-                "name": parameter.name,
-                "unit": parameter.unit,
-                "value": value,
-                "standard_error": _number(error),
-                "identified": bool(identified),
-                "on_bound": bool(on_bound),
-            }
-            for parameter, value, error, identified, on_bound in zip(
-                fit.reward.parameters, fit.reward.theta, fit.standard_errors, fit.identified, fit.on_bound, strict=True
-            )
-        ],
-        "covariance": [[_number(value) for value in row] for row in fit.covariance],
+        "parameters": _parameters(fit),
+        "covariance": numbers(fit.covariance),
+        "covariance_clustered": None if fit.clustered is None else numbers(fit.clustered),
+        "condition_number": number(fit.condition_number),
         "resolution_m": resolution_m,
         "status": fit.status.value,
+        "method": fit.method.value,
         "l2": fit.l2,
+        "prior": fit.prior is not None,
         "initial": {p.name: value for p, value in zip(fit.initial.parameters, fit.initial.theta, strict=True)},
         "log_likelihood": fit.log_likelihood,
         "log_likelihood_initial": fit.log_likelihood_initial,
         "log_likelihood_uniform": fit.log_likelihood_uniform,
         "demonstrations": [demonstration.id for demonstration in demonstrations],
         "participants": sorted({demonstration.participant for demonstration in demonstrations}),
+        "learnt_from": learnt_from,
         "steps": fit.steps,
         "iterations": fit.iterations,
         "evaluations": fit.evaluations,
+        "bootstrap": None if analyses.bootstrap is None else bootstrap_document(analyses.bootstrap),
+        "profiles": [profile_document(one) for one in analyses.profiles],
+        "cross_validation": None if analyses.validation is None else validation_document(analyses.validation),
     }
+
+
+def _parameters(fit: Fit) -> list[dict[str, Any]]:
+    """Estimate and errors by parameter."""
+    nothing = np.full(len(fit.standard_errors), np.nan)
+    robust = nothing if fit.clustered_errors is None else fit.clustered_errors
+    biases = nothing if fit.bias is None else fit.bias
+    return [
+        {
+            "name": parameter.name,
+            "unit": parameter.unit,
+            "value": value,
+            "standard_error": number(error),
+            "standard_error_clustered": number(clustered),
+            "bias_subtracted": number(bias),
+            "identified": bool(identified),
+            "on_bound": bool(on_bound),
+        }
+        for parameter, value, error, clustered, bias, identified, on_bound in zip(
+            fit.reward.parameters,
+            fit.reward.theta,
+            fit.standard_errors,
+            robust,
+            biases,
+            fit.identified,
+            fit.on_bound,
+            strict=True,
+        )
+    ]
 
 
 def read_reward(path: Path) -> LearntReward:
@@ -73,17 +129,25 @@ def read_reward(path: Path) -> LearntReward:
     document = read_json(path, "reward")
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
-    missing = {parameter.name for parameter in Reward.named({}).parameters} - set(names)
-    if missing or len(names) > len(values):
-        raise ArtefactError(f"{path}: expected each parameter once, found {', '.join(names)}")
+    expected = [parameter.name for parameter in Reward.named({}).parameters]
+    if names != expected:
+        raise ArtefactError(f"{path}: expected the parameters {', '.join(expected)}, found {', '.join(names)}")
     try:
         reward = Reward.named(values)
     except NavirlError as error:
         raise ArtefactError(f"{path}: {error}") from error
-    covariance = np.array(document["covariance"], dtype=float)
-    if covariance.shape != (len(values), len(values)):
-        raise ArtefactError(f"{path}: covariance: expected {len(values)} rows and columns, found {covariance.shape}")
-    return LearntReward(reward, covariance, document["resolution_m"], tuple(document["demonstrations"]))
+    covariance = [row(one) for one in document["covariance"]]
+    if len(covariance) != len(names) or any(len(one) != len(names) for one in covariance):
+        raise ArtefactError(f"{path}: covariance: expected {len(names)} rows of {len(names)} numbers")
+    profiles = tuple(profile_of(one, names, str(path)) for one in document["profiles"])
+    return LearntReward(
+        reward=reward,
+        covariance=np.array(covariance),
+        resolution_m=document["resolution_m"],
+        demonstrations=tuple(document["demonstrations"]),
+        status=Status(document["status"]),
+        profiles=profiles,
+    )
 
 
 def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> LearntReward:
@@ -101,8 +165,3 @@ def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> Lear
             f"{min(others):g} m; extract them with --resolution {learnt.resolution_m:g}, or fit anew"
         )
     return learnt
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no NaN."""
-    return float(value) if isfinite(value) else None

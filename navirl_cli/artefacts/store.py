@@ -5,10 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from navirl_cli import __version__
+from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import replacing
 
@@ -98,3 +102,18 @@ def schema_path(kind: str) -> Path:
     name = f"{kind}.schema.json"
     inside = package / "schemas" / name
     return inside if inside.exists() else package.parent / "schemas" / name
+
+
+def number(value: float) -> float | None:
+    """A number as JSON takes it, which knows no NaN and no infinity."""
+    return float(value) if isfinite(value) else None
+
+
+def row(values: list[float | None]) -> FloatArray:
+    """(k,) numbers of a list as :func:`numbers` writes one."""
+    return np.array(values, dtype=float)
+
+
+def numbers(array: FloatArray) -> list[Any]:
+    """Lists of numbers, nested as the array is."""
+    return [numbers(one) if one.ndim else number(float(one)) for one in array]

@@ -1,31 +1,45 @@
 """``navirl fit``: demonstrations to a reward."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite, nan
 from pathlib import Path
 
 import click
+import numpy as np
 
-from navirl_cli.artefacts.rewards import read_reward, reward_document
+from navirl_cli.artefacts.rewards import Analyses, LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.commands.fit_report import remarks, report, warnings
 from navirl_cli.commands.shared import (
+    FilePath,
     Number,
     demonstrations_in,
     demos_argument,
     echo_json,
+    finish,
     force_option,
     json_option,
     output_option,
     progress_bar,
     say,
-    text_table,
+    seed_option,
 )
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.errors import DemonstrationError, RewardError
+from navirl_cli.demos.timing import steps_in_contact
+from navirl_cli.errors import DemonstrationError, NavirlError, RewardError
 from navirl_cli.files import check_writable
-from navirl_cli.irl.fit import PAPER_L2, Fit, Status
+from navirl_cli.irl.bias import corrected
+from navirl_cli.irl.bootstrap import bootstrap as draw_again
+from navirl_cli.irl.evidence import Evidence, evidence_of
+from navirl_cli.irl.fit import PAPER_L2, Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.likelihood import evidence_of
+from navirl_cli.irl.prior import Prior
+from navirl_cli.irl.profile import number_of
+from navirl_cli.irl.profile import profile as follow_profile
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.status import Status
+from navirl_cli.irl.validation import cross_validate as leave_out
 
 
 @click.command()
@@ -38,11 +52,25 @@ from navirl_cli.irl.reward import Reward
     help="Start: an earlier reward file, or parameters as c0=-50,a_g=-0.01,a_p=-5,sigma_p=2.",
 )
 @click.option(
+    "--prior",
+    "prior_file",
+    type=FilePath,
+    help="Earlier reward file, taken as a Gaussian prior with its mean and covariance; the start too without --init.",
+)
+@click.option(
     "--l2",
     default=PAPER_L2,
     show_default=True,
     type=Number(0, 1e6),
-    help="Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p. 0 for none.",
+    help="Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, but for those that a "
+    "--prior knows. 0 for none.",
+)
+@click.option(
+    "--method",
+    type=click.Choice([method.value for method in Method]),
+    default=Method.NEWTON.value,
+    show_default=True,
+    help="Trust-region Newton from several starts, or the paper's gradient ascent (Adam) on the same exact gradient.",
 )
 @click.option(
     "--condition",
@@ -53,16 +81,52 @@ from navirl_cli.irl.reward import Reward
 )
 @click.option("--cycle", type=int, help="Learn from the trials of this cycle only.")
 @click.option("--only-corrected", is_flag=True, help="Learn from trials in which the person intervened only.")
+@click.option(
+    "--steps",
+    type=click.Choice(["all", "contact"]),
+    default="all",
+    show_default=True,
+    help="Learn from all steps of a path, or from those during contact only.",
+)
+@click.option(
+    "--correct-bias",
+    is_flag=True,
+    help="Take off the first-order bias that maximum likelihood has with few demonstrations (it exaggerates a_p).",
+)
+@click.option(
+    "--bootstrap", type=click.IntRange(2, 100_000), metavar="N", help="Fit N times with participants drawn anew."
+)
+@click.option(
+    "--profile",
+    "profiles",
+    multiple=True,
+    metavar="NAME",
+    help="Follow the profile likelihood of this parameter, e.g. sigma_p, to its 95 % interval; repeatable.",
+)
+@click.option(
+    "--cross-validate",
+    type=click.Choice(["participant"]),
+    help="Foretell each participant from the others, against simpler models.",
+)
+@seed_option
 @json_option
 @force_option
 def fit(
     demos: Path,
     output: Path,
     initial: str,
+    prior_file: Path | None,
     l2: float,
+    method: str,
     conditions: tuple[str, ...],
     cycle: int | None,
     only_corrected: bool,
+    steps: str,
+    correct_bias: bool,
+    bootstrap: int | None,
+    profiles: tuple[str, ...],
+    cross_validate: str | None,
+    seed: int,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -72,27 +136,121 @@ def fit(
     the optimum from a trust-region Newton method with several starts, standard errors from the observed information.
     """
     check_writable(output, force=force)
-    earlier = () if "=" in initial or not initial else (Path(initial),)
+    files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
+    if output.resolve() in {file.resolve() for file in files}:
+        raise click.UsageError(f"{output}: would replace what is read; name another output")
+    if cross_validate and prior_file:
+        raise click.UsageError("--cross-validate and --prior exclude each other: the prior may know who is left out")
+    if correct_bias and (prior_file or steps != "all" or bootstrap or profiles or cross_validate):
+        raise click.UsageError(
+            "--correct-bias is for whole paths without --prior, and other questions are asked of the fit itself: "
+            "leave out --prior, --steps, --bootstrap, --profile and --cross-validate"
+        )
     start = _start(initial)
-    chosen = [
+    chosen, evidence = _evidence(_chosen(demos, conditions, cycle, only_corrected=only_corrected), steps)
+    resolution = _common_resolution(chosen)
+    earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
+    if earlier is not None and not initial:
+        start = earlier.reward
+    # What would be refused after the fit is refused before it.
+    for name in profiles:
+        number_of(start, name)
+    for option, wanted in (("--bootstrap", bootstrap), ("--cross-validate", cross_validate)):
+        if wanted:
+            evidence.several_people(option)
+    found = _learn(evidence, start, earlier, l2, Method(method))
+    lost: list[str] = []
+    with _kept(lost):
+        found = corrected(evidence, found) if correct_bias else found
+    analyses = _analyses(evidence, found, bootstrap, profiles, seed, lost, held_out=bool(cross_validate))
+    document = reward_document(found, chosen, [Input.of(path) for path in files], resolution, analyses, steps)
+    write_json(output, "reward", document, force=force)
+    if as_json:
+        echo_json(document)
+    else:
+        click.echo(report(found, analyses))
+    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(found)):
+        say(line)
+    finish(lost)
+
+
+@contextmanager
+def _kept(lost: list[str]) -> Iterator[None]:
+    """Trouble with a question about a fit is no trouble with the fit: it is told at the end."""
+    try:
+        yield
+    except NavirlError as error:
+        lost.append(str(error))
+
+
+def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: float, method: Method) -> Fit:
+    """The fit, with a bar."""
+    prior = None
+    if earlier is not None:
+        if earlier.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+            raise RewardError(
+                f"--prior: that fit is not at its maximum ({earlier.status.value}), and no prior; fit it anew"
+            )
+        prior = Prior.gaussian(np.array(earlier.reward.theta), earlier.covariance)
+    with progress_bar("fit") as update:
+        return fit_reward(
+            evidence,
+            start,
+            l2,
+            prior=prior,
+            method=method,
+            progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
+        )
+
+
+def _chosen(
+    demos: Path, conditions: tuple[str, ...], cycle: int | None, *, only_corrected: bool
+) -> list[Demonstration]:
+    """The demonstrations of a file that are asked for."""
+    return [
         d
         for d in demonstrations_in(demos)
         if (not conditions or d.condition.value in conditions)
         and (cycle is None or d.cycle == cycle)
         and (d.corrected or not only_corrected)
     ]
-    evidence = evidence_of(chosen)
-    resolution = _common_resolution(chosen)
-    with progress_bar("fit") as update:
-        result = fit_reward(evidence, start, l2, lambda step, value: update(step, f"log-likelihood {value:.3f}"))
-    document = reward_document(result, chosen, [Input.of(path) for path in (demos, *earlier)], resolution)
-    write_json(output, "reward", document, force=force)
-    if as_json:
-        echo_json(document)
-    else:
-        click.echo(_report(result))
-    if result.status is not Status.CONVERGED:
-        say(f"{result.status.value}: {result.status.advice}")
+
+
+def _evidence(chosen: list[Demonstration], steps: str) -> tuple[list[Demonstration], Evidence]:
+    """The demonstrations and their steps to learn from."""
+    if steps == "all":
+        return chosen, evidence_of(chosen)
+    pushed = [(demonstration, steps_in_contact(demonstration)) for demonstration in chosen]
+    pushed = [(demonstration, mask) for demonstration, mask in pushed if mask.any()]
+    if chosen and not pushed:
+        raise DemonstrationError("--steps contact: in none of the demonstrations did the person push")
+    chosen = [demonstration for demonstration, _ in pushed]
+    return chosen, evidence_of(chosen).only([mask for _, mask in pushed])
+
+
+def _analyses(
+    evidence: Evidence,
+    found: Fit,
+    replicates: int | None,
+    names: Sequence[str],
+    seed: int,
+    lost: list[str],
+    *,
+    held_out: bool,
+) -> Analyses:
+    """What was asked for besides the fit; what cannot be said is added to ``lost``."""
+    drawn = validation = None
+    followed = []
+    if replicates:
+        with _kept(lost), progress_bar("bootstrap", replicates) as update:
+            drawn = draw_again(evidence, found, replicates, seed, progress=update)
+    for name in dict.fromkeys(names):
+        with _kept(lost), progress_bar("profile") as update:
+            followed.append(follow_profile(evidence, found, name, progress=update))
+    if held_out:
+        with _kept(lost), progress_bar("cross-validation", len(evidence.people)) as update:
+            validation = leave_out(evidence, found.initial, found.l2, progress=update)
+    return Analyses(drawn, tuple(followed), validation)
 
 
 def _start(initial: str) -> Reward:
@@ -126,39 +284,3 @@ def _common_resolution(demonstrations: list[Demonstration]) -> float:
             "a reward per step depends on the step; extract them anew with one --resolution"
         )
     return sides[0]
-
-
-def _report(result: Fit) -> str:
-    """The fit as text."""
-    rows = []
-    for parameter, value, error, identified, on_bound in zip(
-        result.reward.parameters,
-        result.reward.theta,
-        result.standard_errors,
-        result.identified,
-        result.on_bound,
-        strict=True,
-    ):
-        remark = "" if identified else "not identified"
-        rows.append(
-            (
-                parameter.name,
-                f"{value:.4f}",
-                f"{error:.4f}" if isfinite(error) else "-",
-                parameter.unit or "1",
-                "on its bound" if on_bound else remark or parameter.meaning,
-            )
-        )
-    gain = result.log_likelihood - result.log_likelihood_uniform
-    return "\n".join(
-        (
-            text_table(("parameter", "value", "std. error", "unit", "meaning"), rows),
-            "",
-            f"demonstrations   {result.demonstrations}, {result.steps} steps",
-            f"log-likelihood   {result.log_likelihood:.4f} nats, {result.log_likelihood / result.steps:.4f} per step",
-            f"  at the start   {result.log_likelihood_initial:.4f}",
-            f"  uniform policy {result.log_likelihood_uniform:.4f} ({gain / result.steps:.4f} per step worse)",
-            f"iterations       {result.iterations} ({result.evaluations} evaluations from all starts)",
-            f"status           {result.status.value}: {result.status.advice}",
-        )
-    )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
+from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for
 from navirl_cli.commands.shared import (
     FilePath,
     Function,
@@ -19,7 +19,7 @@ from navirl_cli.commands.shared import (
     say,
     seed_option,
 )
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import ArtefactError, DemonstrationError
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -117,6 +117,27 @@ def properties(
     bars, width_in = _bars(demonstrations, learnt, samples, seed), PAGE_IN if wide else COLUMN_IN
     figure, axes = new_figure(width_in, height_for(bars, width_in), len(METRICS))
     draw_properties(axes, bars)
+    save_figure(figure, output, force=force, trim=False)
+    click.echo(output)
+
+
+@plot.command()
+@click.argument("reward", type=FilePath)
+@output_option("Figure to write: .png, .pdf or .svg.")
+@click.option("--wide", is_flag=True, help="As wide as a page of two columns (7.16 in), not one (3.5 in).")
+@force_option
+def profile(reward: Path, output: Path, wide: bool, force: bool) -> None:
+    """Profile likelihoods in a reward file, as made by fit --profile: how sure a parameter is, and how lopsided."""
+    from navirl_cli.figures.profile import draw_profiles
+    from navirl_cli.figures.sheet import check_target, save_figure
+    from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
+
+    check_target(output, force=force)
+    learnt = read_reward(reward)
+    if not learnt.profiles:
+        raise ArtefactError(f"{reward}: holds no profile; make it with navirl fit --profile sigma_p")
+    units = {parameter.name: parameter.unit for parameter in learnt.reward.parameters}
+    figure = draw_profiles(learnt.profiles, units, PAGE_IN if wide else COLUMN_IN)
     save_figure(figure, output, force=force, trim=False)
     click.echo(output)
 

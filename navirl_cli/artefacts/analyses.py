@@ -1,0 +1,86 @@
+"""What reward files say of a fit's certainty beyond its standard errors."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from navirl_cli.artefacts.store import number, numbers, row
+from navirl_cli.errors import ArtefactError
+from navirl_cli.irl.bootstrap import Bootstrap
+from navirl_cli.irl.profile import Profile
+from navirl_cli.irl.validation import Validation
+
+
+def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
+    """Replicates, with their standard errors and 95 % intervals."""
+    lower, upper = found.interval()
+    return {
+        "seed": found.seed,
+        "failed": found.failed,
+        "told": found.told.tolist(),
+        "stopped_early": found.stopped_early,
+        "standard_errors": numbers(found.standard_errors),
+        "lower": numbers(lower),
+        "upper": numbers(upper),
+        "theta": numbers(found.theta),
+    }
+
+
+def profile_document(found: Profile) -> dict[str, Any]:
+    """A profile likelihood with its interval."""
+    return {
+        "parameter": found.name,
+        "level": found.level,
+        "lower": found.lower,
+        "upper": found.upper,
+        "values": numbers(found.values),
+        "relative_log_likelihood": numbers(found.relative),
+        "theta": numbers(found.theta),
+    }
+
+
+def profile_of(document: dict[str, Any], names: Sequence[str], path: str) -> Profile:
+    """A profile read back.
+
+    Args:
+        document: Its part of the file.
+        names: The reward's parameters.
+        path: The file, for messages.
+
+    Raises:
+        ArtefactError: It is of no parameter, or its lists do not fit each other.
+    """
+    name = document["parameter"]
+    if name not in names:
+        raise ArtefactError(f"{path}: holds a profile of {name}, and the reward has {', '.join(names)}")
+    values = row(document["values"])
+    relative = row(document["relative_log_likelihood"])
+    theta = [row(one) for one in document["theta"]]
+    told = np.isfinite(values).all() and np.isfinite(relative).all() and (np.diff(values) > 0).all()
+    fits = len(values) == len(relative) == len(theta) > 1 and all(len(one) == len(names) for one in theta)
+    if not (told and fits):
+        raise ArtefactError(f"{path}: the profile of {name} needs ascending values, and at each a likelihood and a fit")
+    return Profile(name, values, relative, np.array(theta), document["level"], document["lower"], document["upper"])
+
+
+def validation_document(found: Validation) -> dict[str, Any]:
+    """Held-out results by left-out participant."""
+    return {
+        "left_out": list(found.participants),
+        "steps": found.steps.tolist(),
+        "statuses": [status.value for status in found.statuses],
+        "models": {
+            model: {"log_likelihood": numbers(values), "per_step": number(found.per_step(model))}
+            for model, values in found.log_likelihoods.items()
+        },
+        "features": {
+            parameter.name: {
+                "demonstrated": numbers(found.demonstrated[:, j]),
+                "expected": numbers(found.expected[:, j]),
+                "mismatch_standard_errors": numbers(found.mismatch[:, j]),
+                "identified": found.identified[:, j].tolist(),
+            }
+            for j, parameter in enumerate(found.parameters)
+        },
+    }

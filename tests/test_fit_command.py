@@ -1,0 +1,373 @@
+"""``navirl fit`` with all that can be asked of it, and the figure of profiles: text, files, refusals."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import factories as make
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
+from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.artefacts.store import read_json, write_json
+from navirl_cli.cli import cli
+from navirl_cli.commands.fit_report import warnings
+from navirl_cli.demos.demonstration import Contact
+from navirl_cli.demos.timing import steps_in_contact
+from navirl_cli.errors import RewardError
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.prior import Prior
+from navirl_cli.irl.profile import fall_at
+from navirl_cli.irl.reward import Reward
+
+SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
+TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))
+NAMES = ["c0", "a_g", "a_p", "sigma_p"]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Demonstrations of four participants, every other one pushed at; of one; and of nobody pushing; and rewards."""
+    folder = tmp_path_factory.mktemp("fit")
+    pushed = [Contact(0.9, 1.9, 8.0, (1.0, 2.0)), Contact(2.4, 2.45, 5.0, (0.0, 1.0))]
+    every = [
+        replace(one, contacts=tuple(pushed), force_n=np.zeros((len(one.t_s), 2))) if number % 2 else one
+        for number, one in enumerate(make.by_participants(SCENE, TRUTH, 4, 8, seed=2))
+    ]
+    for name, some in (("demos", every), ("one", every[:8]), ("quiet", every[::2])):
+        write_json(folder / f"{name}.json", "demonstrations", demonstrations_document(some, [], {}), force=False)
+    coarse = replace(make.open_grid(14, 8), resolution_m=0.2)
+    other = [make.demonstration(coarse, [[0, 3], [1, 3], [2, 4]])]
+    write_json(folder / "coarse.json", "demonstrations", demonstrations_document(other, [], {}), force=False)
+    everything = ["--bootstrap", 6, "--seed", 3, "--profile", "sigma_p", "--profile", "a_g"]
+    for name, options in (("reward", []), ("full", [*everything, "--cross-validate", "participant"])):
+        words = ["fit", folder / "demos.json", "-o", folder / f"{name}.json", *options]
+        result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+        (folder / f"{name}.txt").write_text(result.stdout)
+    return folder
+
+
+@pytest.fixture
+def navirl(tmp_path, monkeypatch):
+    """Run navirl in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words, code=0):
+        result = CliRunner().invoke(cli, [str(word) for word in words])
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert result.exit_code == code, result.output
+        return result
+
+    return run
+
+
+def values_of(document, key="value"):
+    return [parameter[key] for parameter in document["parameters"]]
+
+
+@pytest.fixture(scope="module")
+def evidence(files):
+    return evidence_of(read_demonstrations(files / "demos.json"))
+
+
+@pytest.fixture(scope="module")
+def full(files):
+    return read_json(files / "full.json", "reward")
+
+
+def test_what_was_not_asked_for_is_not_there(files, full):
+    document = read_json(files / "reward.json", "reward")
+    assert (document["bootstrap"], document["profiles"], document["cross_validation"]) == (None, [], None)
+    assert (document["method"], document["prior"], document["l2"]) == ("newton", False, 1e-3)
+    for key in ("parameters", "covariance", "log_likelihood"):
+        assert full[key] == document[key], "the fit does not depend on what else is asked for"
+
+
+def test_errors_by_participant_and_correlations_are_written_and_printed(files, evidence):
+    document, text = read_json(files / "reward.json", "reward"), (files / "reward.txt").read_text()
+    found = fit(evidence, Reward.named({}))
+    assert values_of(document) == pytest.approx(found.reward.theta)
+    assert values_of(document, "standard_error") == pytest.approx(found.standard_errors)
+    assert values_of(document, "standard_error_clustered") == pytest.approx(found.clustered_errors)
+    assert np.array(document["covariance_clustered"]) == pytest.approx(found.clustered)
+    assert document["condition_number"] == pytest.approx(found.condition_number)
+    assert text.splitlines()[0].split() == "parameter value std. error by participant unit meaning".split()  # noqa: SIM905
+    figures = found.reward.theta[2], found.standard_errors[2], found.clustered_errors[2]
+    assert text.splitlines()[3].split()[:4] == ["a_p", *(f"{figure:.4f}" for figure in figures)]
+    lines = [line.split() for line in text.splitlines()]
+    assert [row for row in lines if row[:1] == ["sigma_p"]][1][1:] == [f"{r:.2f}" for r in found.correlation[3, :3]]
+    assert f"condition number  {found.condition_number:.3g} of the correlations" in text
+    assert f"demonstrations    32 of 4 participants, {found.steps} steps" in text
+
+
+def test_a_single_participant_has_no_errors_by_participant(navirl, files):
+    text = navirl("fit", files / "one.json", "-o", "r.json").stdout
+    assert "by participant" not in text
+    assert "8 of 1 participant, " in text
+    document = read_json(Path("r.json"), "reward")
+    assert document["covariance_clustered"] is None
+    assert values_of(document, "standard_error_clustered") == [None] * 4
+
+
+def test_bootstrap(files, full):
+    drawn, text = full["bootstrap"], (files / "full.txt").read_text()
+    theta = np.array(drawn["theta"])
+    assert theta.shape == (6, 4)
+    assert (drawn["seed"], drawn["failed"]) == (3, 0)
+    assert drawn["standard_errors"] == pytest.approx(theta.std(axis=0, ddof=1))
+    assert drawn["lower"] == pytest.approx(np.percentile(theta, 2.5, axis=0))
+    assert drawn["upper"] == pytest.approx(np.percentile(theta, 97.5, axis=0))
+    assert "bootstrap         6 draws of participants (seed 3)" in text
+    assert f"{drawn['lower'][0]:.4g} to {drawn['upper'][0]:.4g}" in text.splitlines()[1]
+    assert "bootstrap 95 %" in text.splitlines()[0]
+
+
+def test_profiles(files, full):
+    sigma_p, a_g = full["profiles"]
+    assert (sigma_p["parameter"], a_g["parameter"], sigma_p["level"]) == ("sigma_p", "a_g", 0.95)
+    best = values_of(full)[3]
+    assert sigma_p["lower"] < best < sigma_p["upper"]
+    assert best in sigma_p["values"]
+    assert max(sigma_p["relative_log_likelihood"]) == 0.0
+    at = {
+        round(value, 9): fallen
+        for value, fallen in zip(sigma_p["values"], sigma_p["relative_log_likelihood"], strict=True)
+    }
+    assert at[round(sigma_p["lower"], 9)] == pytest.approx(-fall_at(0.95), rel=2e-3)
+    text = (files / "full.txt").read_text()
+    assert f"profile           sigma_p: 95 % interval {sigma_p['lower']:.4f} to {sigma_p['upper']:.4f}" in text
+    back = read_reward(files / "full.json").profiles
+    assert [one.name for one in back] == ["sigma_p", "a_g"]
+    assert back[0].values == pytest.approx(sigma_p["values"])
+    assert (back[0].lower, back[0].upper, back[0].level) == (sigma_p["lower"], sigma_p["upper"], 0.95)
+
+
+def test_cross_validation(files, full, evidence):
+    found, text = full["cross_validation"], (files / "full.txt").read_text()
+    assert found["left_out"] == ["p01", "p02", "p03", "p04"]
+    assert sum(found["steps"]) == full["steps"]
+    assert list(found["models"]) == ["learnt", "no person", "shortest path", "uniform"]
+    for model in found["models"].values():
+        assert model["per_step"] == pytest.approx(sum(model["log_likelihood"]) / full["steps"])
+    assert sum(found["models"]["uniform"]["log_likelihood"]) == pytest.approx(evidence.uniform_log_likelihood())
+    assert list(found["features"]) == NAMES
+    row = next(line for line in text.splitlines() if line.startswith("learnt "))
+    assert row.split()[1] == f"{found['models']['learnt']['per_step']:.4f}"
+    root = np.sqrt(np.mean(np.square(found["features"]["a_p"]["mismatch_standard_errors"])))
+    table = text[text.index("|f_demo - E f|") :].splitlines()
+    assert table[3].split()[:2] == ["a_p", f"{root:.2f}"]
+
+
+def test_json_on_stdout_is_what_is_in_the_file(navirl, files):
+    shown = json.loads(navirl("fit", files / "one.json", "-o", "r.json", "--json", "--profile", "a_p").stdout)
+    written = read_json(Path("r.json"), "reward")
+    assert all(written[key] == value for key, value in shown.items())
+    assert [one["parameter"] for one in shown["profiles"]] == ["a_p"]
+
+
+def test_adam(navirl, files):
+    text = navirl("fit", files / "demos.json", "-o", "r.json", "--method", "adam").stdout
+    document, newton = read_json(Path("r.json"), "reward"), read_json(files / "reward.json", "reward")
+    assert (document["method"], document["status"]) == ("adam", "converged")
+    assert f"iterations        {document['iterations']} " in text
+    assert document["iterations"] > 3 * newton["iterations"]
+    assert newton["log_likelihood"] - 1.0 < document["log_likelihood"] <= newton["log_likelihood"]
+
+
+def test_steps_in_contact_alone(navirl, files, evidence):
+    text = navirl("fit", files / "demos.json", "-o", "r.json", "--steps", "contact", "--l2", "0.1").stdout
+    masks = [steps_in_contact(one) for one in read_demonstrations(files / "demos.json")]
+    document = read_json(Path("r.json"), "reward")
+    assert document["steps"] == sum(int(mask.sum()) for mask in masks) == 16 * 6
+    assert values_of(document) == pytest.approx(fit(evidence.only(masks), Reward.named({}), 0.1).reward.theta, rel=1e-6)
+    assert "demonstrations    16 of 4 participants, 96 steps" in text
+    message = navirl("fit", files / "quiet.json", "-o", "q.json", "--steps", "contact", code=1).stderr
+    assert message == "navirl: --steps contact: in none of the demonstrations did the person push\n"
+
+
+def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
+    navirl("fit", files / "one.json", "-o", "r.json", "--prior", files / "reward.json")
+    document, earlier = read_json(Path("r.json"), "reward"), read_json(files / "reward.json", "reward")
+    assert (document["prior"], document["l2"]) == (True, 1e-3)
+    assert [one["file"] for one in document["inputs"]] == ["one.json", "reward.json"]
+    assert list(document["initial"].values()) == pytest.approx(values_of(earlier))
+    prior = Prior.gaussian(np.array(values_of(earlier)), np.array(earlier["covariance"]))
+    one = evidence_of(read_demonstrations(files / "one.json"))
+    assert values_of(document) == pytest.approx(fit(one, Reward.named({}), 0.0, prior=prior).reward.theta, rel=1e-4)
+    assert all(
+        new < old
+        for new, old in zip(values_of(document, "standard_error"), values_of(earlier, "standard_error"), strict=True)
+    )
+    with_start = ("--init", "c0=-44", "--l2", "0.5", "--json")
+    other = json.loads(
+        navirl("fit", files / "one.json", "-o", "s.json", "--prior", files / "reward.json", *with_start).stdout
+    )
+    assert (other["initial"]["c0"], other["l2"]) == (-44.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("--prior", "{}/reward.json", "--cross-validate", "participant"), 2, "--cross-validate and --prior exclude"),
+        (("--profile", "nonsense"), 1, "navirl: --profile: unknown parameter nonsense; the reward has c0, a_g, a_"),
+        (("--bootstrap", "1"), 2, "Invalid value for '--bootstrap': 1 is not in the range"),
+        (("--cross-validate", "trial"), 2, "Invalid value for '--cross-validate': 'trial' is not 'participant'"),
+        (("--method", "simplex"), 2, "Invalid value for '--method'"),
+        (("--steps", "some"), 2, "Invalid value for '--steps'"),
+        (("--prior", "none.json"), 1, "navirl: none.json: cannot be read"),
+        (("--prior", "{}/demos.json"), 1, "expected navirl reward (format 'navirl/reward')"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_asked_for_is_refused_and_nothing_is_written(navirl, files, tmp_path, words, code, message):
+    words = [word.format(files) for word in words]
+    result = navirl("fit", files / "demos.json", "-o", "r.json", *words, code=code)
+    assert message in result.stderr
+    assert result.stdout == ""
+    if code == 1:
+        assert result.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_prior_on_other_cells_is_refused(navirl, files):
+    message = navirl("fit", files / "coarse.json", "-o", "r.json", "--prior", files / "reward.json", code=1).stderr
+    assert "reward.json: learnt on cells of 0.1 m, but the demonstrations lie on cells of 0.2 m" in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--bootstrap", "5"), "navirl: --bootstrap needs several participants, and all demonstrations are of p01"),
+        (("--cross-validate", "participant"), "navirl: --cross-validate needs several participants, and all"),
+    ],
+)  # fmt: skip
+def test_what_one_participant_cannot_say_is_refused(navirl, files, words, message):
+    stderr = navirl("fit", files / "one.json", "-o", "r.json", *words, code=1).stderr
+    assert stderr.startswith(message)
+    assert stderr.count("\n") == 1
+
+
+def test_a_prior_that_is_no_covariance_is_refused(navirl, files):
+    document = json.loads((files / "reward.json").read_text())
+    document["covariance"][0][0] = -1.0
+    Path("broken.json").write_text(json.dumps(document))
+    stderr = navirl("fit", files / "demos.json", "-o", "r.json", "--prior", "broken.json", code=1).stderr
+    assert "the covariance of the prior is not positive definite" in stderr
+
+
+def test_the_same_seed_writes_the_same_bytes(navirl, files):
+    words = ("fit", files / "demos.json", "--bootstrap", "2", "--profile", "c0")
+    for number, options in enumerate(((), ("--seed", "0"), ("--seed", "1"))):
+        navirl(*words, *options, "-o", f"{number}.json")
+    contents = [Path(f"{number}.json").read_bytes() for number in range(3)]
+    assert contents[0] == contents[1]
+    assert contents[1] != contents[2]
+
+
+def test_parameters_that_are_hardly_told_apart_are_named(evidence):
+    found = fit(evidence, Reward.named({}))
+    found = replace(found, participants=10)
+    assert warnings(found) == []
+    covariance = found.covariance.copy()
+    covariance[1, 2] = covariance[2, 1] = -0.99 * np.sqrt(covariance[1, 1] * covariance[2, 2])
+    (line,) = warnings(replace(found, covariance=covariance))
+    assert re.match(r"a_g and a_p are hardly told apart \(correlation -0\.990\): read them together; people at", line)
+    covariance[1] = covariance[:, 1] = np.nan
+    assert warnings(replace(found, covariance=covariance)) == []
+
+
+def test_few_participants_are_too_few_for_errors_by_participant(evidence):
+    found = fit(evidence, Reward.named({}))
+    (line,) = warnings(found)
+    assert line.startswith("errors by participant come from 4 participants: rough below 10")
+    assert warnings(replace(found, participants=1)) == []
+
+
+def test_demonstrations_of_the_robot_alone_are_told(navirl, files):
+    demonstrations = read_demonstrations(files / "one.json")
+    some = [replace(one, corrected=number > 1) for number, one in enumerate(demonstrations)]
+    write_json(Path("some.json"), "demonstrations", demonstrations_document(some, [], {}), force=False)
+    told = navirl("fit", "some.json", "-o", "a.json").stderr
+    assert "navirl: 2 of 8 demonstrations show no intervention: they teach what the robot does by itself" in told
+    for options in (("--only-corrected",), ("--condition", "force")):
+        assert "no intervention" not in navirl("fit", "some.json", "-o", "b.json", "--force", *options).stderr
+
+
+def test_what_is_read_is_not_replaced(navirl, files):
+    before = (files / "one.json").read_bytes()
+    told = navirl("fit", files / "one.json", "-o", files / "one.json", "--force", code=2).stderr
+    assert "one.json: would replace what is read; name another output" in told
+    navirl("fit", files / "one.json", "--prior", files / "reward.json", "-o", files / "reward.json", "--force", code=2)
+    assert (files / "one.json").read_bytes() == before
+
+
+def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monkeypatch):
+    def nothing(*_args, **_options):
+        raise RewardError("--profile a_p: a better fit was found on the way")
+
+    monkeypatch.setattr("navirl_cli.commands.fit.follow_profile", nothing)
+    told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
+    assert told.stderr.endswith("navirl: --profile a_p: a better fit was found on the way\n")
+    assert read_reward(Path("r.json")).profiles == ()
+
+
+def test_a_prior_must_be_a_maximum_and_should_be_of_others(navirl, files):
+    told = navirl("fit", files / "one.json", "-o", "r.json", "--prior", files / "reward.json").stderr
+    assert "navirl: the prior was learnt from p01/1, p01/2" in told
+    assert "what they say counts twice" in told
+    document = json.loads((files / "reward.json").read_text())
+    Path("early.json").write_text(json.dumps({**document, "status": "stopped early"}))
+    told = navirl("fit", files / "one.json", "-o", "s.json", "--prior", "early.json", code=1).stderr
+    assert "navirl: --prior: that fit is not at its maximum (stopped early), and no prior; fit it anew" in told
+
+
+def test_the_bias_is_taken_off_and_told(navirl, files):
+    plain = read_json(files / "reward.json", "reward")
+    text = navirl("fit", files / "demos.json", "-o", "r.json", "--correct-bias").stdout
+    found = read_json(Path("r.json"), "reward")
+    bias = np.array(values_of(found, "bias_subtracted"))
+    assert np.array(values_of(found)) + bias == pytest.approx(values_of(plain))
+    assert np.abs(bias / values_of(found, "standard_error")).max() < 1
+    assert found["log_likelihood"] < plain["log_likelihood"]
+    assert "bias taken off" in text
+    assert values_of(plain, "bias_subtracted") == [None] * 4
+    for options in (("--prior", files / "reward.json"), ("--steps", "contact"), ("--profile", "c0")):
+        told = navirl("fit", files / "demos.json", "-o", "s.json", "--correct-bias", *options, code=2).stderr
+        assert "--correct-bias is for whole paths without --prior" in told
+
+
+def test_a_bias_too_large_to_be_taken_off_leaves_the_fit_as_it_is(navirl, files):
+    one = read_demonstrations(files / "demos.json")[:1]
+    write_json(Path("single.json"), "demonstrations", demonstrations_document(one, [], {}), force=False)
+    told = navirl("fit", "single.json", "-o", "r.json", "--correct-bias", code=3).stderr
+    assert "navirl: --correct-bias: the demonstrations are too few for it: the correction would go too far" in told
+    assert values_of(read_json(Path("r.json"), "reward"), "bias_subtracted") == [None] * 4
+
+
+def test_plot_profile_draws_what_the_file_holds(navirl, files):
+    for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
+        name = f"profile{suffix}"
+        assert navirl("plot", "profile", files / "full.json", "-o", name).stdout == f"{name}\n"
+        assert Path(name).read_bytes().startswith(magic)
+    navirl("plot", "profile", files / "full.json", "-o", "wide.png", "--wide")
+    widths = [int.from_bytes(Path(name).read_bytes()[16:20], "big") for name in ("profile.png", "wide.png")]
+    assert widths[1] > 2 * widths[0]
+
+
+def test_plot_profile_without_a_profile_is_refused(navirl, files, tmp_path):
+    message = navirl("plot", "profile", files / "reward.json", "-o", "a.png", code=1).stderr
+    assert message.endswith("reward.json: holds no profile; make it with navirl fit --profile sigma_p\n")
+    assert "a figure is saved as" in navirl("plot", "profile", files / "full.json", "-o", "a.gif", code=1).stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interval_that_reaches_a_bound_does_not_go_beyond(files):
+    # The deviation's weight cannot be positive.
+    assert "profile           a_g: 95 % interval -" in (files / "full.txt").read_text()
+    assert "to inf" not in (files / "full.txt").read_text()
