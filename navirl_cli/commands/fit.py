@@ -70,7 +70,7 @@ from navirl_cli.irl.validation import cross_validate as leave_out
     type=click.Choice([method.value for method in Method]),
     default=Method.NEWTON.value,
     show_default=True,
-    help="Trust-region Newton from several starts, or the paper's gradient ascent (Adam) on the same exact gradient.",
+    help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam) on the same exact gradient.",
 )
 @click.option(
     "--condition",
@@ -133,7 +133,7 @@ def fit(
     """Learn a navigation reward from demonstrations.
 
     Maximum-entropy inverse reinforcement learning, exact: soft values, visits and derivatives come from linear systems,
-    the optimum from a trust-region Newton method with several starts, standard errors from the observed information.
+    the optimum from a trust-region Newton method from two starts, standard errors from the observed information.
     """
     check_writable(output, force=force)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]

@@ -109,7 +109,7 @@ def fit(
         l2: Weight of the regulariser, nats per squared scale (the scales: 10 /m for c0, 1 for the others); it acts on
             parameters of which the prior knows nothing.
         prior: What is known besides, in the parameters' units.
-        method: Trust-region Newton from several starts, or the study's gradient ascent from one.
+        method: Trust-region Newton from two starts, or the study's gradient ascent from one.
         fixed: Names of parameters that stay where they start.
         restarts: Whether Newton's method tries the parameters' other starts too.
         progress: Called with the number of accepted steps so far and the objective.

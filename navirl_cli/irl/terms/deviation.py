@@ -18,7 +18,7 @@ class Deviation:
             1.0,
             -0.01,
             "reward per step and squared metre from the nominal path",
-            restarts=(-1.0, -2.0),  # from the study's start Newton's method alone sticks at 0 on some of its data
+            restarts=(-1.0,),  # from the study's start Newton's method alone sticks at 0 on some of its data
         ),
     )
 

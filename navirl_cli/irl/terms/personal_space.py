@@ -21,7 +21,7 @@ class PersonalSpace:
             1.0,
             2.0,
             "decay of the personal space with squared distance",
-            restarts=(1.0, 8.0),  # a wide space and a narrow one
+            restarts=(8.0,),  # a narrow space; wide ones are found from the study's start
         ),
     )
 
