@@ -20,21 +20,6 @@ from navirl_cli.cli import COMMANDS, cli
 SAMPLES = Path(__file__).parent.parent / "sample_logs"
 
 
-@pytest.fixture
-def navirl(tmp_path, monkeypatch):
-    """Run navirl in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words, code=0):
-        result = CliRunner().invoke(cli, [str(word) for word in words])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        assert result.exit_code == code, result.output
-        return result
-
-    return run
-
-
 @pytest.fixture(scope="module")
 def work(tmp_path_factory):
     """Demonstrations and a reward of one sample log."""

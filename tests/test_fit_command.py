@@ -52,21 +52,6 @@ def files(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def navirl(tmp_path, monkeypatch):
-    """Run navirl in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words, code=0):
-        result = CliRunner().invoke(cli, [str(word) for word in words])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        assert result.exit_code == code, result.output
-        return result
-
-    return run
-
-
 def values_of(document, key="value"):
     return [parameter[key] for parameter in document["parameters"]]
 

@@ -144,6 +144,29 @@ def fit(
 
     search = _by_adam if method is Method.ADAM else _by_newton
     found = search(objective, starts, told & ~held, count)
+    return _as_fit(objective, found, first, told, held, (method, l2, prior))
+
+
+def _as_fit(
+    objective: Objective,
+    found: Maximum,
+    first: Point,
+    told: NDArray[np.bool_],
+    held: NDArray[np.bool_],
+    settings: tuple[Method, float, Prior | None],
+) -> Fit:
+    """Uncertainty and status at a maximum.
+
+    Args:
+        objective: What was maximised.
+        found: Where the search ended.
+        first: The given start.
+        told: (k,) parameters that change the objective.
+        held: (k,) parameters that were to stay.
+        settings: Method, regulariser and prior of the fit.
+    """
+    method, l2, prior = settings
+    evidence = objective.evidence
     best, scale = found.best, objective.scale
     on_bound = ((best.x <= objective.bounds[0]) | (best.x >= objective.bounds[1])) & ~held
     covariance, blind = uncertainty.observed(*objective.information(best), told & ~on_bound & ~held)
@@ -163,7 +186,7 @@ def fit(
         objective=best.value,
         log_likelihood_initial=objective.log_likelihood(first.x, first.value),
         log_likelihood_uniform=evidence.uniform_log_likelihood(),
-        initial=initial,
+        initial=objective.initial,
         method=method,
         l2=l2,
         prior=prior,
