@@ -12,6 +12,7 @@ from navirl_cli.errors import NavirlError
 #: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME; it is loaded when called, so
 #: that help and completion stay fast.
 COMMANDS = {
+    "inspect": "Tell what logs hold, and what extract would make of it.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths.",

@@ -9,6 +9,11 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def map_in_order(
     function: Callable[[Item], Result], items: Sequence[Item], executor: Executor | None = None
 ) -> Iterator[Result]:
@@ -22,8 +27,7 @@ def map_in_order(
     Yields:
         Results in the order of the items.
     """
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    workers = min(len(items), allowed)
+    workers = min(len(items), cores())
     if executor is not None:
         yield from executor.map(function, items)
     elif workers < 2:

@@ -12,10 +12,14 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
+ROS1 = get_typestore(Stores.ROS1_NOETIC)
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 ODOMETRY = "nav_msgs/msg/Odometry"
+TF = "tf2_msgs/msg/TFMessage"
+JOY = "sensor_msgs/msg/Joy"
 #: A definition no parser takes: it stands beside good ones in every forged run, and must never matter.
 BROKEN = "camera_msgs/msg/Blob"
+ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", TF))
 START_NS = 1_700_000_000_000_000_000
 
 
@@ -62,8 +66,39 @@ def odometry(t_ns: int, x: float, y: float, frame_id: str = "odom", child: str =
     )
 
 
+def transforms(t_ns: int, children: Sequence[str], x: float = 1.0) -> Any:
+    """A TFMessage with a transform for each child, whose stamps are 1 ns apart."""
+    turn = build("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.6, w=0.8)
+    links = [
+        build(
+            "geometry_msgs/msg/TransformStamped",
+            header=header(t_ns + number, "odom"),
+            child_frame_id=child,
+            transform=build("geometry_msgs/msg/Transform", translation=vector(x, 10.0 * number, 0.0), rotation=turn),
+        )
+        for number, child in enumerate(children)
+    ]
+    return build(TF, transforms=links)
+
+
+def joy(t_ns: int, axes: Sequence[float], buttons: Sequence[int] = ()) -> Any:
+    numbers = {"axes": np.array(axes, dtype=np.float32), "buttons": np.array(buttons, dtype=np.int32)}
+    return build(JOY, header=header(t_ns, "joy"), **numbers)
+
+
 def cdr(message: Any, *, little_endian: bool = True) -> bytes:
     return bytes(STORE.serialize_cdr(message, message.__msgtype__, little_endian=little_endian))
+
+
+def in_ros1(message: Any) -> Any:
+    """The same message as ROS 1 defines its type; headers have number 7."""
+    if isinstance(message, list):
+        return [in_ros1(one) for one in message]
+    if not hasattr(message, "__msgtype__"):
+        return message
+    fields = {name: in_ros1(value) for name, value in vars(message).items()}
+    number = {"seq": 7} if message.__msgtype__ == "std_msgs/msg/Header" else {}
+    return ROS1.types[message.__msgtype__](**number, **fields)
 
 
 def run(
@@ -158,21 +193,38 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-def slow_read(path: Path, topic: str) -> list[tuple[int, Any]]:
+def slow_read(paths: Path | Sequence[Path], topic: str) -> list[tuple[int, Any]]:
     """Times and message objects of a topic, by mcap's forward reader and rosbags, sorted stably by time."""
-    stores: dict[str, Any] = {}
+    stores: dict[tuple[Path, int], Any] = {}
     found = []
-    with path.open("rb") as file:
-        for schema, channel, message in NonSeekingReader(file).iter_messages(topics=[topic], log_time_order=False):
-            if schema.name not in stores:
-                store = get_typestore(Stores.EMPTY)
-                text = schema.data.decode()
-                parse = get_types_from_idl(text) if schema.encoding == "ros2idl" else None
-                store.register(parse or get_types_from_msg(text, schema.name))
-                stores[schema.name] = store
-            if channel.topic == topic:
-                found.append((message.log_time, stores[schema.name].deserialize_cdr(message.data, schema.name)))
+    for path in [paths] if isinstance(paths, Path) else paths:
+        with path.open("rb") as file:
+            for schema, channel, message in NonSeekingReader(file).iter_messages(topics=[topic], log_time_order=False):
+                store = stores.setdefault((path, schema.id), get_typestore(Stores.EMPTY))
+                name = schema.name if "/msg/" in schema.name else schema.name.replace("/", "/msg/")
+                if name not in store.fielddefs:
+                    text = schema.data.decode()
+                    store.register(from_idl(text) if schema.encoding == "ros2idl" else get_types_from_msg(text, name))
+                decode = store.deserialize_ros1 if channel.message_encoding == "ros1" else store.deserialize_cdr
+                found.append((message.log_time, decode(message.data, name)))
     return sorted(found, key=lambda pair: pair[0])
+
+
+def from_idl(text: str) -> Any:
+    """Types of definitions in IDL, without their separators and what they include."""
+    lines = [line for line in text.splitlines() if not line.startswith(("===", "IDL:", "#include"))]
+    return get_types_from_idl("\n".join(lines))
+
+
+def entries(message: Any, path: str) -> list[Any]:
+    """What a column has of a message: one value, or those of a field in a sequence; times in ns."""
+    found = [message]
+    for part in path.split("."):
+        name = part.removesuffix("[]")
+        found = [getattr(one, name) for one in found]
+        if part != name:
+            found = [entry for many in found for entry in many]
+    return [one.sec * 10**9 + one.nanosec if hasattr(one, "nanosec") else one for one in found]
 
 
 def chunk_starts(path: Path) -> list[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""A small log of a robot that drives 4 m and is pushed once, with any part of it left out or spoilt."""
+"""A small log of a robot that drives 4 m and is pushed on the way, with any part of it left out or spoilt."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ START_NS = 1_700_000_000_000_000_000
 STAND_S, DRIVE_S, LENGTH_M = 2.0, 10.0, 4.0
 PUSH_S = (5.0, 7.0)
 PUSH_N = np.array([0.0, 12.0])
+ODOMETRY_HZ, PEOPLE_HZ = 30, 5
 
 
 @dataclass(frozen=True)
@@ -26,14 +27,25 @@ class Run:
     obstacles: tuple[tuple[int, int], ...] = ()
     map_yaw: float = 0.0
     people: tuple[tuple[float, float], ...] | None = ((2.0, 0.9),)
+    #: People who walk: corners (seconds, x, y) of each one's way, seen from the first to the last. With any, messages
+    #: come at 5 Hz: first those who stand, then the walkers who are seen.
+    walks: tuple[tuple[tuple[float, float, float], ...], ...] = ()
+    #: How long the log lasts; after its drive the robot stands.
+    lasts_s: float = 14.0
+    #: (since, until, x, y): seconds, and newtons in the map's frame, which is the robot's.
+    pushes: tuple[tuple[float, float, float, float], ...] = ((*PUSH_S, 0.0, 12.0),)
+    #: How fast the robot gives way to a push, m/s/N.
+    gain: float = 0.0
     #: Goal messages: (seconds, x, y).
     goals: tuple[tuple[float, float, float], ...] = ((1.5, 4.0, 0.0),)
     map_to_odom: bool = True
     sensor_mounted: bool = True
     #: Yaw of the wrench's frame on the robot, rad.
     sensor_yaw: float = 1.2
-    #: How fast the sensor turns on the robot, rad/s.
+    #: How fast the sensor turns on the robot, rad/s, in place of its yaw.
     sensor_turns: float = 0.0
+    #: Drift of the sensor's bias, N a minute, sensor frame.
+    drift_n_min: tuple[float, float, float] = (0.0, 0.0, 0.0)
     #: Topics whose header stamps are 0.
     unstamped: tuple[str, ...] = ()
     people_frame: str = "map"
@@ -68,9 +80,7 @@ def write_run(path: Path, run: Run = Run()) -> Path:
             head = header(0 if "/goal_pose" in run.unstamped else at, run.goal_frame)
             log.message("/goal_pose", message_type("geometry_msgs/msg/PoseStamped")(head, _pose(x, y)), at)
         if run.people is not None:
-            poses = [_pose(x, y) for x, y in run.people]
-            people = message_type("geometry_msgs/msg/PoseArray")(header(START_NS, run.people_frame), poses)
-            log.message("/people", people, START_NS)
+            _people(log, run)
         if run.joystick:
             _joystick(log, run)
         if run.session is not None:
@@ -82,6 +92,39 @@ def position_m(seconds: np.ndarray) -> np.ndarray:
     """(n, 2) m where the robot truly is."""
     share = np.clip((seconds - STAND_S) / DRIVE_S, 0, 1)
     return np.stack([LENGTH_M * share, np.zeros_like(share)], axis=1)
+
+
+def force_n(run: Run, seconds: np.ndarray) -> np.ndarray:
+    """(n, 2) N: the pushes, in the map's frame."""
+    force = np.zeros((len(seconds), 2))
+    for since, until, *push in run.pushes:
+        force[(seconds >= since) & (seconds < until)] += push
+    return force
+
+
+def _driven_m(run: Run, seconds: np.ndarray) -> np.ndarray:
+    """(n, 2) m where a robot is that gives way to pushes."""
+    fine = np.arange(0, run.lasts_s, 0.001)
+    aside = run.gain * np.cumsum(force_n(run, fine), axis=0) * 0.001
+    pushed = np.stack([np.interp(seconds, fine, axis) for axis in aside.T], axis=1)
+    return pushed + (position_m(seconds) if run.moves else 0.0)
+
+
+def velocity_m_s(run: Run, seconds: np.ndarray) -> np.ndarray:
+    """(n, 2) m/s: how fast that robot is at an instant."""
+    forward = (position_m(seconds + 1e-6) - position_m(seconds - 1e-6)) / 2e-6
+    return (forward if run.moves else 0.0) + run.gain * force_n(run, seconds)
+
+
+def _people(log: LogWriter, run: Run) -> None:
+    """Once, or again and again where somebody walks."""
+    for step in range(round(run.lasts_s * PEOPLE_HZ) if run.walks else 1):
+        seconds = step / PEOPLE_HZ
+        seen = [np.array(way).T for way in run.walks if way[0][0] <= seconds <= way[-1][0]]
+        places = [*run.people, *((np.interp(seconds, t, x), np.interp(seconds, t, y)) for t, x, y in seen)]
+        at = START_NS + round(seconds * 1e9)
+        head = header(at, run.people_frame)
+        log.message("/people", message_type("geometry_msgs/msg/PoseArray")(head, [_pose(x, y) for x, y in places]), at)
 
 
 def _pose(x: float, y: float, yaw: float = 0.0) -> Any:
@@ -113,25 +156,26 @@ def _transforms(log: LogWriter, run: Run) -> None:
         return message_type("geometry_msgs/msg/TransformStamped")(header(t_ns, parent), child, motion)
 
     if run.sensor_turns:
-        for step in range(29):
+        for step in range(round(2 * run.lasts_s) + 1):
             at = START_NS + step * 500_000_000
             log.message("/tf", tf([stamped(at, "base", "sensor", _pose(0, 0, run.sensor_turns * step / 2))]), at)
     elif run.sensor_mounted:
         log.message("/tf_static", tf([stamped(START_NS, "base", "sensor", _pose(0, 0, run.sensor_yaw))]), START_NS)
     if run.map_to_odom:
         # The odometry's frame is turned by 90 degrees and moved.
-        for step in range(29):
+        for step in range(round(2 * run.lasts_s) + 1):
             at = START_NS + step * 500_000_000
             log.message("/tf", tf([stamped(at, "map", "odom", _pose(1.0, 2.0, np.pi / 2))]), at)
 
 
 def _wrench(log: LogWriter, topic: str, run: Run, rng: np.random.Generator) -> None:
-    seconds = np.arange(0, 14, 0.01)
+    seconds = np.arange(0, run.lasts_s, 0.01)
     times = START_NS + np.round(seconds * 1e9).astype(np.int64)
-    push = ((seconds >= PUSH_S[0]) & (seconds < PUSH_S[1]))[:, None] * PUSH_N
-    cos, sin = np.cos(run.sensor_yaw), np.sin(run.sensor_yaw)
+    push = force_n(run, seconds)
+    yaw = run.sensor_turns * seconds if run.sensor_turns else run.sensor_yaw
+    cos, sin = np.cos(yaw), np.sin(yaw)
     force = np.column_stack([cos * push[:, 0] + sin * push[:, 1], -sin * push[:, 0] + cos * push[:, 1], 0 * seconds])
-    force += np.array([3.0, -2.0, 5.0]) + rng.normal(0, 0.2, force.shape)
+    force += np.array([3.0, -2.0, 5.0]) + rng.normal(0, 0.2, force.shape) + np.outer(seconds / 60, run.drift_n_min)
     force[200 : 200 + run.wrench_nan] = np.nan
     vector = message_type("geometry_msgs/msg/Vector3")
     wrench = message_type("geometry_msgs/msg/Wrench")(vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
@@ -141,9 +185,9 @@ def _wrench(log: LogWriter, topic: str, run: Run, rng: np.random.Generator) -> N
 
 
 def _odometry(log: LogWriter, run: Run) -> None:
-    seconds = np.arange(0, 14, 1 / 30)
+    seconds = np.arange(0, run.lasts_s, 1 / ODOMETRY_HZ)
     times = START_NS + np.round(seconds * 1e9).astype(np.int64)
-    true = position_m(seconds) if run.moves else np.zeros((len(seconds), 2))
+    true = _driven_m(run, seconds)
     # map -> odom turns by 90 degrees and moves by (1, 2): odom = R(-90) (map - (1, 2)).
     moved = true - (1.0, 2.0)
     vector = message_type("geometry_msgs/msg/Vector3")
@@ -155,7 +199,8 @@ def _odometry(log: LogWriter, run: Run) -> None:
         message_type("geometry_msgs/msg/TwistWithCovariance")(twist, np.zeros(36)),
     )
     columns = {"pose.pose.position.x": moved[:, 1], "pose.pose.position.y": -moved[:, 0]}
-    columns["pose.pose.position.x"][max(0, 420 - run.odometry_nan) :] = np.nan
+    columns["twist.twist.linear.x"], columns["twist.twist.linear.y"] = velocity_m_s(run, seconds).T
+    columns["pose.pose.position.x"][max(0, len(seconds) - run.odometry_nan) :] = np.nan
     turn = np.full((len(seconds), 2), (np.sin(-np.pi / 4), np.cos(-np.pi / 4)))
     turn[200 : 200 + run.odometry_zero] = 0.0
     columns["pose.pose.orientation.z"], columns["pose.pose.orientation.w"] = turn.T
@@ -163,7 +208,7 @@ def _odometry(log: LogWriter, run: Run) -> None:
 
 
 def _joystick(log: LogWriter, run: Run) -> None:
-    for step in range(280):
+    for step in range(round(20 * run.lasts_s)):
         at = START_NS + step * 50_000_000
         axes = np.array([0.0, 0.7 if 100 <= step < 140 else 0.0, run.stick_rest], dtype=np.float32)
         axes = axes if run.joystick == "moved" else axes[[0, 2]]

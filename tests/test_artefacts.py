@@ -10,10 +10,12 @@ import pytest
 from jsonschema import Draft202012Validator
 from robot_log import Run, write_run
 
-from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
+from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, read_demonstrations
 from navirl_cli.artefacts.rewards import Analyses, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import Input, read_json, schema_path, write_json
+from navirl_cli.demos.demonstration import PersonTrack
 from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.demos.gain import Gain
 from navirl_cli.errors import ArtefactError
 from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.evidence import evidence_of
@@ -32,7 +34,10 @@ def demonstration(tmp_path_factory):
 @pytest.fixture
 def demos(tmp_path, demonstration):
     path = tmp_path / "demos.json"
-    two = [demonstration, replace(demonstration, id="run/2", force_n=None, cycle=2, people_m=np.zeros((0, 2)))]
+    walker = PersonTrack("ann", np.array([0.1, 0.3, 1.7]), np.array([[2.0, 0.5], [2.0, 0.7], [2.1, 1.3]]))
+    sitter = PersonTrack("bob", np.zeros(0), np.zeros((0, 2)))
+    watched = replace(demonstration, people_m=np.array([[2.0, 0.9], [1.0, 1.0]]), tracks=(walker, sitter))
+    two = [watched, replace(demonstration, id="run/2", force_n=None, cycle=2, people_m=np.zeros((0, 2)))]
     write_json(path, "demonstrations", demonstrations_document(two, [Input("run.mcap", "0" * 64)], {}), force=False)
     return path, two
 
@@ -58,10 +63,44 @@ def test_demonstrations_come_back_as_they_were(demos):
                 assert new.digest == old.digest
             elif field.name == "contacts":
                 assert [c.impulse_ns for c in new] == [pytest.approx(c.impulse_ns, abs=1e-6) for c in old]
+            elif field.name == "tracks":
+                assert [track.name for track in new] == [track.name for track in old]
+                for track, was in zip(new, old, strict=True):
+                    assert (track.t_s == was.t_s).all()
+                    assert track.xy_m == pytest.approx(was.xy_m)
             elif isinstance(old, np.ndarray):
                 assert new == pytest.approx(old, abs=1e-6)
             else:
                 assert new == old
+
+
+def test_a_file_says_how_far_people_strayed(demos):
+    path, (watched, _) = demos
+    ann, bob = read_json(path, "demonstrations")["demonstrations"][0]["tracks"]
+    assert ann["spread_m"] == pytest.approx(watched.tracks[0].spread_m, abs=1e-6)
+    assert (bob["spread_m"], bob["t_s"]) == (0.0, [])
+
+
+def test_a_file_without_tracks_and_gain_is_read_as_before(demos):
+    path, _ = demos
+    first, second = read_demonstrations(edited(path, lambda d: [one.pop("tracks") for one in d["demonstrations"]]))
+    assert first.tracks == second.tracks == ()
+    assert len(first.people_m) == 2
+    assert read_json(path, "demonstrations")["version"] == 1
+
+
+def test_gains_are_written_by_log_and_together(demos):
+    path, _ = demos
+    found = gain_document(
+        [("a.mcap", Gain(0.015, 0.001, 4, 0.1)), ("b.mcap", None), ("c.mcap", Gain(0.017, 0.001, 3, 0.0))]
+    )
+    assert [one["log"] for one in found["logs"]] == ["a.mcap", "c.mcap"]
+    assert (found["m_s_per_n"], found["pushes"]) == (pytest.approx(0.016), 7)
+    assert gain_document([("b.mcap", None)]) is None
+    for gain in (found, None):
+        assert read_json(edited(path, lambda d, gain=gain: d.update(gain=gain)), "demonstrations")["gain"] == gain
+    with pytest.raises(ArtefactError, match="breaks the schema of navirl demonstrations at gain"):
+        read_demonstrations(edited(path, lambda d: d.update(gain={**found, "pushes": 0})))
 
 
 def test_a_reward_comes_back_with_its_covariance(tmp_path, demonstration):
@@ -108,6 +147,14 @@ def extract_coarse(demonstration):
         (lambda d: d["demonstrations"][0]["x_m"].__setitem__(3, "a"), "demonstration run/1: could not convert"),
         (lambda d: d["demonstrations"][0]["x_m"].__setitem__(3, None), "demonstration run/1: xy_m holds values that"),
         (lambda d: d["demonstrations"][0]["cells"].pop(3), "demonstration run/1: step 2 of its path does not lead"),
+        (lambda d: d["demonstrations"][0]["tracks"].pop(), "run/1: needs a track for each of its 2 people, found 1"),
+        (lambda d: d["demonstrations"][0]["tracks"][0]["t_s"].pop(), "run/1: track of person ann: t_s and xy_m need"),
+        (
+            lambda d: d["demonstrations"][0]["tracks"][0]["x_m"].pop(),
+            "run/1: all input arrays must have the same shape",
+        ),
+        (lambda d: d["demonstrations"][0]["tracks"][0].update(x_m=["a"] * 3), "run/1: could not convert"),
+        (lambda d: d["demonstrations"][0]["tracks"][0].pop("name"), "at demonstrations/0/tracks/0: 'name' is a requ"),
         (lambda d: next(iter(d["maps"].values()))["rows"].append("#"), "a map's rows differ in length"),
         (lambda d: next(iter(d["maps"].values())).update(resolution_m=-1), "resolution_m: -1 is less than or equal"),
     ],

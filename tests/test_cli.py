@@ -54,7 +54,7 @@ def test_help_imports_nothing_heavy():
 
 
 def test_an_unknown_command_and_no_command(navirl):
-    assert "No such command 'learn'; commands are extract, fit" in navirl("learn", code=2).stderr
+    assert "No such command 'learn'; commands are inspect, extract, fit" in navirl("learn", code=2).stderr
     assert "Usage" in navirl(code=2).output
 
 
@@ -98,30 +98,30 @@ def test_extract_json_has_numbers(navirl, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "options", "message"),
     [
-        ({"wrench_topics": ()}, (), r"run.mcap: no wrench: expected a topic of type geometry_msgs/msg/WrenchStamped"),
+        ({"wrench_topics": ()}, (), r"run.mcap: no wrench: expected a topic of type geometry_msgs/WrenchStamped"),
         (
             {"odometry": False},
             (),
-            "run.mcap: no odometry: expected a topic of type nav_msgs/msg/Odometry; the",
+            "run.mcap: no odometry, and tf does not tell poses in its place: transform from 'base' to 'map'",
         ),
-        ({"map": False}, (), "run.mcap: no map: expected a topic of type nav_msgs/msg/OccupancyGrid"),
+        ({"map": False}, (), "run.mcap: no map: expected a topic of type nav_msgs/OccupancyGrid"),
         (
             {"wrench_topics": ("/wrench", "/raw")},
             (),
-            "several topics could be the wrench (geometry_msgs/msg/WrenchStamped): /raw, /wrench; choose one with",
+            "several topics could be the wrench (geometry_msgs/WrenchStamped): /raw, /wrench; choose one with",
         ),
         (
             {},
             ("--topic", "wrench=/nope"),
-            "--topic wrench=/nope: expected geometry_msgs/msg/WrenchStamped, but",
+            "wrench=/nope: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, but there is no such topic",
         ),
         (
             {},
             ("--topic", "wrench=/odom"),
-            "expected geometry_msgs/msg/WrenchStamped, but it holds nav_msgs/msg/Od",
+            "geometry_msgs/Wrench, but it holds nav_msgs/Odometry",
         ),
         ({}, ("--topic", "lidar=/scan"), "--topic: no role is called lidar; roles are wrench, odometry, map"),
-        ({"map_to_odom": False}, (), "odometry of 'base' is given in frame 'odom': transform from 'odom' to 'map'"),
+        ({"map_to_odom": False}, (), "/odom places 'base' in frame 'odom': transform from 'odom' to 'map'"),
         ({"sensor_mounted": False}, (), "the wrench is given in frame 'sensor': transform from 'sensor' to 'base'"),
         ({"map_yaw": 0.5}, (), "expected a map whose cells run along its frame's axes, found one turned by 28.6 deg"),
         ({"moves": False}, (), "no trial became a demonstration"),
@@ -170,7 +170,8 @@ def test_a_bad_log_among_good_ones_is_left_out_with_exit_code_3(navirl, tmp_path
     assert "left out: " in result.stderr
     assert "b.mcap: no wrench" in result.stderr
     assert [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]] == ["a/1"]
-    both = navirl("extract", bad, bad, "-o", "other.json", code=1).stderr
+    other = log_with(tmp_path, "c.mcap", wrench_topics=())
+    both = navirl("extract", bad, other, "-o", "other.json", code=1).stderr
     assert both.count("no wrench") == 2
 
 
@@ -195,7 +196,7 @@ def test_a_missing_log_among_good_ones_and_a_log_given_twice(navirl, tmp_path):
     copy = tmp_path / "copy.mcap"
     copy.write_bytes(good.read_bytes())
     stderr = navirl("extract", good, "none.mcap", copy, "-o", "demos.json", code=3).stderr
-    assert "left out: none.mcap: cannot be read" in stderr
+    assert "left out: none.mcap: expected an MCAP file, found nothing there" in stderr
     assert "copy.mcap: the same recording as run.mcap" in stderr
     document = read_json(Path("demos.json"), "demonstrations")
     assert [source["file"] for source in document["inputs"]] == ["run.mcap"]

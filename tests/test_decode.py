@@ -1,13 +1,121 @@
-"""Decoding: definitions of all kinds, and what does not decode."""
+"""Decoding: encodings and definitions of all kinds, and what does not decode."""
 
 import log_factory as forge
 import numpy as np
 import pytest
+from rosbags.interfaces import Nodetype
 
-from navirl_cli.errors import LogError
+from navirl_cli.logs import decode
+from navirl_cli.logs.parts import Batch, Channel
 from navirl_cli.logs.reader import read
+from navirl_cli.logs.schema import parse_definition
 
 WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x", "wrench.force.z", "wrench.torque.y")
+TF_FIELDS = tuple(
+    f"transforms[].{name}"
+    for name in ("header.stamp", "header.frame_id", "child_frame_id", "transform.translation.y", "transform.rotation.z")
+)
+#: Messages of each type and the fields to read.
+SAMPLES = {
+    forge.WRENCH: ([forge.wrench(10**9 + k, (k, -k, 0.5), "ab"[: k % 3]) for k in range(9)], WRENCH_FIELDS),
+    forge.ODOMETRY: (
+        [forge.odometry(k, k, 0.25) for k in range(5)],
+        ("header.stamp", "child_frame_id", "pose.covariance", "twist.twist.angular.z"),
+    ),
+    forge.TF: ([forge.transforms(k, "abc"[: k % 4], k) for k in range(9)], TF_FIELDS),
+    forge.JOY: ([forge.joy(k, [0.5] * (k % 3), [k] * 2) for k in range(9)], ("header.stamp", "axes[]", "buttons[]")),
+}
+
+
+def check_same(path, fields):
+    """The columns of topic /t must be those that the slow twin reads; returns them."""
+    result = read(path, {"/t": fields})
+    assert result.damage == ()
+    series, slow = result.series["/t"], forge.slow_read(path, "/t")
+    assert len(series) == len(slow) > 0
+    for name in fields:
+        found = [forge.entries(message, name) for _, message in slow]
+        if "[]" in name:
+            assert series.counts[name.partition("[]")[0] + "[]"].tolist() == [len(some) for some in found]
+        assert np.array_equal(series.columns[name], np.array([one for some in found for one in some])), name
+    return series
+
+
+@pytest.mark.parametrize("typename", SAMPLES)
+def test_ros1(tmp_path, typename):
+    messages, fields = SAMPLES[typename]
+    text = forge.ROS1.generate_msgdef(typename, ros_version=1)[0].replace("std_msgs/Header header", "Header header")
+    assert "time stamp" in text
+    assert ("Header header" in text, "uint32 seq" in text) == (True, True)
+    name = typename.replace("/msg/", "/")
+    log = [
+        forge.Message("/t", name, k, bytes(forge.ROS1.serialize_ros1(forge.in_ros1(message), typename)))
+        for k, message in enumerate(messages)
+    ]
+    path = forge.forge(tmp_path / "run.mcap", log, definitions={name: ("ros1msg", text)}, encodings={"/t": "ros1"})
+    number = "transforms[].header.seq" if typename == forge.TF else "header.seq"
+    series = check_same(path, (*fields, number))
+    assert set(series.columns[number].tolist()) == {7}
+    assert series.columns[number].dtype == np.uint32
+
+
+def idl(typename):
+    """A type's definition as rosbag2 stores it where one of its types comes from an IDL file."""
+    words = {"float64": "double", "float32": "float", "bool": "boolean", "byte": "octet"}
+    texts, todo = {}, [typename]
+    for name in todo:
+        typedefs, fields = "", ""
+        for field, desc in forge.STORE.fielddefs[name][1]:
+            inner = desc[1][0] if desc[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else desc
+            word = inner[1].replace("/", "::") if inner[0] == Nodetype.NAME else words.get(inner[1][0], inner[1][0])
+            todo += [inner[1]] if inner[0] == Nodetype.NAME and inner[1] not in todo else []
+            if desc[0] == Nodetype.ARRAY:
+                typedefs += f"    typedef {word} {word}__{desc[1][1]}[{desc[1][1]}];\n"
+                word = f"{word}__{desc[1][1]}"
+            word = f"sequence<{word}>" if desc[0] == Nodetype.SEQUENCE else word
+            fields += (
+                f'      @verbatim (language="comment", text=\n        "# of {field};" "\\n")\n      {word} {field};\n\n'
+            )
+        package, _, short = name.split("/")
+        texts[name] = (
+            f"{'=' * 80}\nIDL: {name}\n// generated from rosidl_adapter/resource/msg.idl.em\n\n"
+            f'#include "builtin_interfaces/msg/Time.idl"\n#include "std_msgs/msg/Header.idl"\n\nmodule {package} {{\n'
+            f"  module msg {{\n    module {short}_Constants {{\n      const uint8 NONE = 1;\n    }};\n{typedefs}"
+            f"    struct {short} {{\n{fields}    }};\n  }};\n}};\n"
+        )
+    return "".join(texts.values())
+
+
+@pytest.mark.parametrize("typename", SAMPLES)
+def test_idl_as_rosbag2_stores_it(tmp_path, typename):
+    messages, fields = SAMPLES[typename]
+    log = [forge.Message("/t", typename, k, forge.cdr(message)) for k, message in enumerate(messages)]
+    # Joy for those who edit on Windows
+    text = idl(typename).replace("\n", "\r\n" if typename == forge.JOY else "\n")
+    check_same(forge.forge(tmp_path / "run.mcap", log, definitions={typename: ("ros2idl", text)}), fields)
+
+
+def test_idl_with_every_primitive(tmp_path):
+    text = (
+        "="
+        * 80
+        + "\nIDL: d_msgs/msg/D\nmodule d_msgs { module msg { struct D { boolean b; string s; octet o; int16 i; "
+        "sequence<string> names; double d[2]; uint64 u; }; }; };\n"
+    )
+    body = b"\1" + bytes(3) + b"\3\0\0\0hi\0" + b"\x7f" + np.int16(-3).tobytes() + bytes(2)
+    body += b"\2\0\0\0" + b"\2\0\0\0a\0" + bytes(2) + b"\1\0\0\0\0"
+    body += bytes(-len(body) % 8) + np.array([0.5, 2.0]).tobytes() + np.uint64(2**63).tobytes()
+    path = forge.forge(
+        tmp_path / "run.mcap",
+        [forge.Message("/d", "d_msgs/msg/D", k, b"\0\1\0\0" + body) for k in range(3)],
+        definitions={"d_msgs/msg/D": ("ros2idl", text)},
+    )
+    series = read(path, {"/d": ("b", "s", "o", "i", "d", "u", "names[]")}).series["/d"]
+    columns = series.columns
+    assert columns["b"].dtype == np.bool_
+    assert columns["d"].tolist() == [[0.5, 2.0]] * 3
+    assert [columns[name][2] for name in ("b", "s", "o", "i", "u")] == [True, "hi", 127, -3, 2**63]
+    assert (columns["names[]"].tolist(), series.counts["names[]"].tolist()) == (["a", ""] * 3, [2, 2, 2])
 
 
 def test_conflicting_definitions_of_two_channels_do_not_meet(tmp_path):
@@ -27,121 +135,53 @@ def test_conflicting_definitions_of_two_channels_do_not_meet(tmp_path):
     assert series["/b"].columns["x.v"].tolist() == [-7]
 
 
-def test_idl_with_every_primitive(tmp_path):
-    text = (
-        "="
-        * 80
-        + "\nIDL: d_msgs/msg/D\nmodule d_msgs { module msg { struct D { boolean b; string s; octet o; int16 i; "
-        "sequence<string> names; double d[2]; uint64 u; }; }; };\n"
-    )
-    body = b"\1" + bytes(3) + b"\3\0\0\0hi\0" + b"\x7f" + np.int16(-3).tobytes() + bytes(2)
-    body += b"\2\0\0\0" + b"\2\0\0\0a\0" + bytes(2) + b"\1\0\0\0\0"
-    body += bytes(-len(body) % 8) + np.array([0.5, 2.0]).tobytes() + np.uint64(2**63).tobytes()
-    path = forge.forge(
-        tmp_path / "run.mcap",
-        [forge.Message("/d", "d_msgs/msg/D", k, b"\0\1\0\0" + body) for k in range(3)],
-        definitions={"d_msgs/msg/D": ("ros2idl", text)},
-    )
-    columns = read(path, {"/d": ("b", "s", "o", "i", "d", "u")}).series["/d"].columns
-    assert columns["b"].dtype == np.bool_
-    assert columns["d"].tolist() == [[0.5, 2.0]] * 3
-    assert [columns[name][2] for name in ("b", "s", "o", "i", "u")] == [True, "hi", 127, -3, 2**63]
-    slow = read(path, {"/d": None}).series["/d"].messages[0]
-    assert (slow.s, slow.names, slow.u) == ("hi", ["a", ""], 2**63)
+def batch_of(payloads):
+    sizes = np.array([len(payload) for payload in payloads])
+    places = np.cumsum(sizes) - sizes
+    return Batch(Channel(1, "/t", "", "", "", ""), b"".join(payloads), places, sizes, places, np.arange(len(sizes)))
 
 
-def test_unwanted_channels_never_spoil_a_read(tmp_path):
-    path = forge.forge(tmp_path / "run.mcap", forge.run(40), encodings={"/camera": "json"})
-    assert len(read(path, {"/wrench": WRENCH_FIELDS}).series["/wrench"]) == 40
+@pytest.mark.parametrize("gathered", [True, False])
+def test_a_byte_of_a_bool_can_be_any(monkeypatch, gathered):
+    if not gathered:
+        monkeypatch.setattr(decode, "derive", lambda *_: None)
+    schema = parse_definition("a_msgs/msg/A", "ros2msg", "bool[2] two\nbool[] any\nbool one\n")
+    payload = b"\0\1\0\0\2\0\0\0\2\0\0\0\0\xff\x80"
+    part = decode.Decoder(schema, ("two", "any[]", "one")).decode(batch_of([payload] * 9))
+    for path, expected in (("two", [[True, False]] * 9), ("any[]", [False, True] * 9), ("one", [True] * 9)):
+        assert part.columns[path].tolist() == expected
+        assert set(part.columns[path].tobytes()) <= {0, 1}
 
 
-@pytest.mark.parametrize(
-    ("topic", "fields", "options", "message"),
-    [
-        (
-            "/camera",
-            None,
-            {},
-            (
-                r"run.mcap: topic /camera: expected cdr with ros2msg or ros2idl, found message encoding 'cdr', schema "
-                r"'camera_msgs/msg/Blob' \(ros2msg\): its definition does not parse .*; record the topic again"
-            ),
-        ),
-        (
-            "/camera",
-            None,
-            {"encodings": {"/camera": "json"}},
-            "topic /camera: expected cdr .*, found message encoding 'json'.*; record or convert it as ROS 2",
-        ),
-        (
-            "/wrench",
-            ("header.stamp",),
-            {"definitions": {forge.WRENCH: ("protobuf", "")}},
-            "topic /wrench: .*the schema's encoding is 'protobuf'",
-        ),
-        (
-            "/wrench",
-            ("header.stamp",),
-            {"definitions": {forge.WRENCH: ("ros2msg", "std_msgs/Header header\n")}},
-            "no definition of std_msgs/msg/Header",
-        ),
-        (
-            "/wrench",
-            ("wrench.force.w",),
-            {},
-            "topic /wrench: geometry_msgs/msg/Vector3 has no field 'w' of 'wrench.force.w'; its fields are x, y, z; ",
-        ),
-        (
-            "/wrench",
-            ("wrench.force",),
-            {},
-            "'wrench.force' is no number, text, time or fixed array of numbers; read whole messages instead",
-        ),
-        (
-            "/wrench",
-            ("wrench.force.x.y",),
-            {},
-            "'y' in 'wrench.force.x.y' lies below a field that is no single message",
-        ),
-    ],
-)
-def test_a_topic_that_cannot_be_decoded_is_named(tmp_path, topic, fields, options, message):
-    path = forge.forge(tmp_path / "run.mcap", forge.run(40), **options)
-    with pytest.raises(LogError, match=message) as caught:
-        read(path, {topic: fields})
-    assert "\n" not in str(caught.value)
+@pytest.mark.parametrize("path", ["word", "other"])
+def test_a_text_that_is_no_utf8_is_no_message(path):
+    """Whether the text is wanted or not: else what is lost would hang on how messages are decoded."""
+    schema = parse_definition("a_msgs/msg/A", "ros2msg", "string word\nstring other\n")
+    good, bad = b"\0\1\0\0\3\0\0\0\xc3\xbc\0\0\2\0\0\0o\0", b"\0\1\0\0\3\0\0\0\xff\xbc\0\0\2\0\0\0o\0"
+    part = decode.Decoder(schema, (path,)).decode(batch_of([good, bad, good]))
+    assert part.columns[path].tolist() == [{"word": "ü", "other": "o"}[path]] * 2
+    assert (part.order.tolist(), part.count) == ([0, 2], 3)
+    assert "'utf-8' codec can't decode byte 0xff" in part.trouble
 
 
-def test_two_types_on_one_topic_are_refused(tmp_path):
-    one, two = forge.run(1)[:2]
-    mixed = [forge.Message("/x", one.typename, 1, one.payload), forge.Message("/x", two.typename, 2, two.payload)]
-    path = forge.forge(tmp_path / "run.mcap", mixed, channel_for={1: 1})
-    with pytest.raises(
-        LogError, match="topic /x: expected geometry_msgs/msg/WrenchStamped, as in its other channels, found nav_msgs"
-    ):
-        read(path, {"/x": ("header.stamp",)})
-
-
-def test_a_channel_that_claims_cdr_and_is_not(tmp_path):
-    lies = [forge.Message("/wrench", forge.WRENCH, k, b'{"force": 3}') for k in range(5)]
-    path = forge.forge(tmp_path / "run.mcap", lies)
-    with pytest.raises(
-        LogError,
-        match=r"topic /wrench: expected CDR messages of type .*, found none among 5 \(Invalid or unsupported CDR",
-    ):
-        read(path, {"/wrench": ("wrench.force.x",)})
+def test_messages_smaller_than_a_definitions_array_take_no_memory(tmp_path):
+    definitions = {"a_msgs/msg/A": ("ros2msg", "float64[200000000] d\n")}
+    messages = [forge.Message("/a", "a_msgs/msg/A", k, b"\0\1\0\0" + bytes(288)) for k in range(50)]
+    result = read(forge.forge(tmp_path / "run.mcap", messages, definitions=definitions), {"/a": ("d",)})
+    assert result.series["/a"].columns["d"].shape == (0, 200_000_000)
+    (note,) = result.damage
+    assert "all 50 messages of /a do not decode" in note.reason
+    assert "(expected an array of 1600000000 bytes, found messages of up to 292 bytes)" in note.reason
 
 
 def test_one_message_that_does_not_decode_is_damage(tmp_path):
     messages = forge.run(30)
     messages[0] = forge.Message("/wrench", forge.WRENCH, messages[0].log_time_ns, messages[0].payload[:20])
     path = forge.forge(tmp_path / "run.mcap", messages)
-    for fields in (WRENCH_FIELDS, None):
-        result = read(path, {"/wrench": fields})
-        assert len(result.series["/wrench"]) == 29
-        assert "1 of 30 messages of /wrench do not decode as geometry_msgs/msg/WrenchStamped and are lost" in str(
-            result.damage[0]
-        )
+    result = read(path, {"/wrench": WRENCH_FIELDS})
+    assert "1 of 30 messages of /wrench do not decode as geometry_msgs/msg/WrenchStamped and are lost" in str(
+        result.damage[0]
+    )
     assert np.array_equal(
         result.series["/wrench"].log_time_ns, [m.log_time_ns for m in messages[1:] if m.topic == "/wrench"]
     )

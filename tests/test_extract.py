@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from robot_log import DRIVE_S, LENGTH_M, PUSH_N, PUSH_S, STAND_S, START_NS, Run, position_m, write_run
 
-from navirl_cli.demos.contact import PushSettings, hysteresis, pushes_of, quiet_bias
+from navirl_cli.demos.contact import PushSettings, pushes_of
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings, extract, numbered
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split, trials_of
 from navirl_cli.errors import DemonstrationError, LogError
 from navirl_cli.logs.load import load_recording
+from navirl_cli.logs.recording import Jump
 
 GOAL_S = 1.5
 
@@ -39,7 +40,7 @@ def test_poses_come_into_the_map_frame_through_tf(make):
     assert recording.xy_m == pytest.approx(position_m(seconds), abs=1e-9)
     assert recording.yaw_rad == pytest.approx(0.0, abs=1e-9)
     assert recording.goal_m == pytest.approx(np.array([[4.0, 0.0]]))
-    assert recording.people_m[0] == pytest.approx(np.array([[2.0, 0.9]]))
+    assert recording.people[0].xy_m == pytest.approx(np.array([[2.0, 0.9]]))
 
 
 def test_a_trial_becomes_a_demonstration(make):
@@ -64,23 +65,6 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
     assert contact.peak_n == pytest.approx(12.0, abs=1.0)
     quiet = (d.t_s < 3) | (d.t_s > 6)
     assert np.abs(d.force_n[quiet].mean(axis=0)).max() < 0.05
-
-
-def test_the_bias_is_found_beside_long_pushes():
-    rng = np.random.default_rng(2)
-    force = rng.normal(0, 0.2, (6000, 3)) + np.array([4.0, -1.0, -7.0])
-    for start in (500, 2000, 4000):  # a quarter of the time under steady pushes
-        force[start : start + 500] += (20.0, 5.0, 0.0)
-    bias, quiet = quiet_bias(force, 100.0)
-    assert bias == pytest.approx([4.0, -1.0, -7.0], abs=0.03)
-    assert not quiet[600:900].any()
-
-
-def test_hysteresis_by_hand():
-    size = np.array([0, 2, 1, 4, 2, 0.5, 2, 2, 0, 5.0])
-    assert hysteresis(size, 3.0, 0.9).tolist() == [[1, 4], [9, 9]]
-    assert hysteresis(size, 9.0, 1.0).shape == (0, 2)
-    assert hysteresis(np.array([5.0, 5.0]), 3.0, 1.0).tolist() == [[0, 1]]
 
 
 def test_a_threshold_within_the_noise_is_told(make):
@@ -300,3 +284,15 @@ def test_people_where_none_can_stand_are_noted(make):
         "a person at x 1.98 m, y 1.20 m stands in a wall of the map",
         "a person at x 90.00 m, y 0.00 m stands off the map",
     )
+
+
+def test_jumps_of_the_localisation_are_noted_with_the_trial(make):
+    recording = make()
+    start_ns = one(recording).start_ns
+    jumps = [
+        Jump(start_ns + round(seconds * 1e9), size) for seconds, size in ((-1, 0.9), (3.24, 0.42), (5, 0.3), (20, 1))
+    ]
+    assert one(replace(recording, jumps=tuple(jumps[:2]))).notes == ("the localisation jumps by 0.42 m at 3.2 s",)
+    (note,) = one(replace(recording, jumps=tuple(jumps))).notes
+    assert note == "the localisation jumps 2 times, at most by 0.42 m at 3.2 s"
+    assert one(replace(recording, jumps=(jumps[0], jumps[3]))).notes == ()

@@ -1,13 +1,17 @@
 import gzip
+import os
 import re
 
 import log_factory as forge
+import lz4.frame
 import pytest
 import zstandard
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.reader import read, scan
 from navirl_cli.logs.records import MAGIC
+from navirl_cli.logs.sniff import check_magic, check_path, decompressed_name
+from navirl_cli.logs.whole import open_log
 
 CASES = {
     "ros1.bag": (
@@ -22,10 +26,6 @@ CASES = {
         ),
     ),
     "r.mcap.gz": (gzip.compress(MAGIC), "a file compressed as a whole with gzip; decompress it first: gzip -dk {path}"),
-    "r.mcap.zstd": (
-        zstandard.compress(MAGIC),
-        "a file compressed as a whole with zstd; decompress it first: zstd -d {path}",
-    ),
     "r.zip": (b"PK\x03\x04" + bytes(9), "a zip archive; unpack it first: unzip {path}"),
     "empty.mcap": (b"", "an empty file; record or copy it again"),
     "half_magic.mcap": (MAGIC[:5], "its first 5 bytes only; nothing was recorded: record or copy it again"),
@@ -73,3 +73,57 @@ def test_a_folder_and_a_missing_file(tmp_path):
         scan(tmp_path)
     with pytest.raises(LogError, match=r"none.mcap: expected an MCAP file, found nothing there; check the path"):
         scan(tmp_path / "none.mcap")
+
+
+def test_a_pipe_is_refused_before_it_blocks(tmp_path):
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(LogError, match=r"pipe.mcap: expected an MCAP file, found a pipe or a device; write it into a"):
+        check_path(tmp_path / "pipe.mcap")
+
+
+def test_a_path_that_cannot_be_looked_at(tmp_path):
+    with pytest.raises(LogError, match=r"expected an MCAP file, found: File name too long; check path and rights"):
+        check_path(tmp_path / ("a" * 300))
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(LogError, match=r"file/a.mcap: expected an MCAP file, found nothing there; check the path"):
+        check_path(tmp_path / "file" / "a.mcap")
+
+
+INSIDE = {
+    "ros1.bag": (
+        "a ROS 1 bag; run {command}, then convert it: rosbags-convert --src {plain} --dst ros1_mcap --dst-storage mcap"
+    ),
+    "r.db3": (
+        "a ROS 2 bag in SQLite; run {command}, then convert its folder, metadata.yaml included: "
+        "rosbags-convert --src {dir} --dst r_mcap --dst-storage mcap"
+    ),
+    "r.zip": "a zip archive; run {command}, then unpack it first: unzip {plain}",
+    "empty.mcap": "an empty file; record or copy it again",
+    "half_magic.mcap": "its first 5 bytes only; nothing was recorded: record or copy it again",
+    "magic.mcap": "the end of the file (8 bytes); nothing was recorded: record or copy it again",
+    "zeros.mcap": "zero bytes; the file was lost when the disk or the power failed: give an .mcap file",
+    "data.json": "JSON; give an .mcap file",
+}
+
+
+@pytest.mark.parametrize("name", INSIDE)
+@pytest.mark.parametrize("kind", ["zstd", "lz4"])
+def test_what_is_no_log_inside_of_a_compression_is_named(tmp_path, name, kind):
+    plain = tmp_path / name
+    path = tmp_path / f"{name}.{kind}"
+    path.write_bytes({"zstd": zstandard.compress, "lz4": lz4.frame.compress}[kind](CASES[name][0]))
+    command = f"zstd -d {path} -o {plain}" if kind == "zstd" else f"lz4 -d {path} {plain}"
+    message = INSIDE[name].format(command=command, plain=plain, dir=tmp_path)
+    with pytest.raises(LogError, match=re.escape(f" inside of its {kind} compression, found {message}")) as caught:
+        open_log(path)
+    assert str(caught.value).startswith(f"{path}: expected an MCAP ")
+
+
+def test_what_starts_like_a_log_passes(tmp_path):
+    check_magic(tmp_path, MAGIC + b"\1", 9)
+    check_magic(tmp_path, MAGIC + b"\1", 9, "zstd")
+
+
+def test_what_decompresses_never_gets_the_name_of_the_file_itself(tmp_path):
+    assert decompressed_name(tmp_path / "a.mcap.zst") == tmp_path / "a.mcap"
+    assert decompressed_name(tmp_path / "a.mcap") == tmp_path / "decompressed_a.mcap"

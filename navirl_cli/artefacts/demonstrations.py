@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from navirl_cli.artefacts.store import Input, read_json
-from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
+from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
+from navirl_cli.demos.gain import Gain, pooled
 from navirl_cli.demos.grid import FloatArray, Grid
-from navirl_cli.errors import ArtefactError, NavirlError
+from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
 
 #: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
 DECIMALS = 6
@@ -34,6 +35,14 @@ def demonstrations_document(
         },
         "demonstrations": [_written(demonstration) for demonstration in demonstrations],
     }
+
+
+def gain_document(gains: Sequence[tuple[str, Gain | None]]) -> dict[str, Any] | None:
+    """The gains of recordings, each with its log's name, and the one of all together; None where nobody pushed."""
+    known = [(log, gain) for log, gain in gains if gain is not None]
+    if not known:
+        return None
+    return {**vars(pooled([gain for _, gain in known])), "logs": [{"log": log, **vars(gain)} for log, gain in known]}
 
 
 def read_demonstrations(path: Path) -> list[Demonstration]:
@@ -86,10 +95,22 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
         ],
         "goal_m": _rounded(np.array(d.goal_m)),
         "people_m": [_rounded(person) for person in d.people_m],
+        "tracks": [_track_written(track) for track in d.tracks],
         "robot_radius_m": d.robot_radius_m,
         "map": d.grid.digest,
         "cells": d.cells.tolist(),
         "notes": list(d.notes),
+    }
+
+
+def _track_written(track: PersonTrack) -> dict[str, Any]:
+    """How a person moved, as JSON."""
+    return {
+        "name": track.name,
+        "spread_m": round(track.spread_m, DECIMALS),
+        "t_s": [round(float(t), 9) for t in track.t_s],
+        "x_m": _rounded(track.xy_m[:, 0]),
+        "y_m": _rounded(track.xy_m[:, 1]),
     }
 
 
@@ -132,7 +153,17 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             grid=grids[content["map"]],
             cells=np.array(content["cells"], dtype=np.int64),
             log=content["log"],
+            tracks=tuple(_track(track) for track in content.get("tracks", ())),
             notes=tuple(content["notes"]),
         )
     except (ValueError, TypeError, OverflowError) as error:
         raise ValueError(f"demonstration {name}: {error}") from error
+
+
+def _track(content: Mapping[str, Any]) -> PersonTrack:
+    """How a person moved in a demonstration."""
+    t, x, y = (np.array(content[key], dtype=float) for key in ("t_s", "x_m", "y_m"))
+    try:
+        return PersonTrack(content["name"], t, np.stack([x, y], axis=1))
+    except DemonstrationError as error:  # which does not know whose track it is
+        raise ValueError(str(error)) from error

@@ -1,39 +1,43 @@
 """``navirl extract``: logs to demonstrations."""
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from functools import partial
-from math import degrees, hypot
 from pathlib import Path
 from typing import Any
 
 import click
 
-from navirl_cli.artefacts.demonstrations import demonstrations_document
+from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document
 from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.commands.extract_report import gain_table, trial_row, trial_table
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
-    Pair,
     Point,
+    bytes_bar,
     echo_json,
     finish,
     force_option,
     json_option,
     output_option,
-    progress_bar,
     say,
-    text_table,
+    topic_option,
+    topics_by_role,
 )
-from navirl_cli.demos.contact import PushSettings
-from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
 from navirl_cli.demos.extract import extract as extract_one
-from navirl_cli.demos.lines import path_length_m
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split
-from navirl_cli.errors import DemonstrationError, NavirlError
+from navirl_cli.errors import DemonstrationError, LogError, NavirlError
 from navirl_cli.files import check_writable
-from navirl_cli.logs.load import load_recording
+from navirl_cli.logs.clocks import TimeSource
+from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.map_file import read_map
+from navirl_cli.logs.reader import Progress
+from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import map_in_order
 
 
@@ -68,7 +72,34 @@ from navirl_cli.parallel import map_in_order
     type=Number(0, 1000, min_open=True),
     help="A contact begins above this force, N, and ends below half of it.",
 )
-@click.option("--topic", "topics", multiple=True, type=Pair(), help="ROLE=/topic where several fit, e.g. wrench=/ft.")
+@click.option(
+    "--wrench-filter",
+    default=CUTOFF_HZ,
+    show_default=True,
+    type=Number(0.01, 1000),
+    help="The force is low-passed below this frequency, Hz.",
+)
+@click.option(
+    "--gain",
+    is_flag=True,
+    help="Estimate how fast the robot gives way to a push to the side; with --json the trials go under trials.",
+)
+@topic_option
+@click.option(
+    "--map", "map_file", type=FilePath, help="Map in place of the log's: a Nav2 map YAML beside its pgm or png."
+)
+@click.option("--frame", help="Frame that everything is brought into, in place of the map's.")
+@click.option("--wrench-frame", help="Frame that the wrench is given in, in place of its header's.")
+@click.option(
+    "--time",
+    "time_source",
+    type=click.Choice([source.value for source in TimeSource]),
+    default=TimeSource.HEADER.value,
+    show_default=True,
+    help="When a message was measured: its header's stamp, or when the recorder got it.",
+)
+@click.option("--join", is_flag=True, help="Take all LOGs as pieces of one recording.")
+@click.option("--strict", is_flag=True, help="Refuse a log of which something is lost.")
 @json_option
 @force_option
 def extract(
@@ -82,15 +113,29 @@ def extract(
     people: tuple[tuple[float, float], ...],
     goal: tuple[float, float] | None,
     contact_force: float,
+    wrench_filter: float,
+    gain: bool,
     topics: tuple[tuple[str, str], ...],
+    map_file: Path | None,
+    frame: str | None,
+    wrench_frame: str | None,
+    time_source: str,
+    join: bool,
+    strict: bool,
     as_json: bool,
     force: bool,
 ) -> None:
     """Turn MCAP logs into demonstrations.
 
-    Finds wrench, odometry, map, people, goals, joystick and tf by message type, splits each log into trials, finds the
-    intervals in which a person pushes, and puts each trial's path on the grid. The map should be the one in which the
-    robot drove; a plain map is grown by the robot's radius, a costmap taken as it is.
+    LOG is an MCAP file (also one compressed as a whole with zstd or lz4), a rosbag2 folder, a folder of recordings, or
+    a pattern. Finds wrench, odometry, map, people, goals, joystick and tf by message type (navirl inspect shows what
+    it would take), splits each log into trials, finds the intervals in which a person pushes, and puts each trial's
+    path on the grid. The map should be the one in which the robot drove; a plain map is grown by the robot's radius, a
+    costmap taken as it is.
+
+    Of the wrench only the force is used, less the sensor's slowly changing bias and turned into the robot's base frame.
+    A force does not depend on where the sensor sits; the torque does, by the lever arm, and is not used. A push on the
+    robot's body that does not pass through the sensor is not seen.
     """
     check_writable(output, force=force)
     settings = ExtractSettings(
@@ -98,45 +143,80 @@ def extract(
         resolution_m=resolution,
         robot_radius_m=robot_radius,
         rasterizer=Rule(rasterizer),
-        push=PushSettings(begins_n=contact_force),
+        push=PushSettings(begins_n=contact_force, cutoff_hz=wrench_filter),
         participant=participant,
         people_m=people or None,
         goal_m=goal,
+        gain=gain,
     )
-    good, failed = _all_extracted(logs, settings, dict(topics))
-    demonstrations = numbered(result for _, result in good)
-    document = demonstrations_document(demonstrations, [source for source, _ in good], asdict(settings))
+    options = LoadOptions(
+        topics=topics_by_role(topics),
+        time=TimeSource(time_source),
+        frame=frame,
+        wrench_frame=wrench_frame,
+        occupancy=None if map_file is None else read_map(map_file),
+        strict=strict,
+    )
+    good, failed = _all_extracted(logs, settings, options, join=join)
+    results = [result for _, result in good]
+    demonstrations = numbered(results)
+    inputs = [file for files, _ in good for file in files] + ([] if map_file is None else [Input.of(map_file)])
+    document = demonstrations_document(demonstrations, inputs, asdict(settings) | _said(options, map_file))
+    if gain:
+        document["gain"] = gain_document([(result.log, result.gain) for result in results])
     write_json(output, "demonstrations", document, force=force)
-    rows = [_row(demonstration) for demonstration in demonstrations]
+    rows = [trial_row(demonstration) for demonstration in demonstrations]
     if as_json:
-        echo_json(rows)
+        echo_json({"trials": rows, "gain": document["gain"]} if gain else rows)
     else:
-        click.echo(text_table(list(FORMATS), [[_shown(name, row[name]) for name in FORMATS] for row in rows]))
-    for _, result in good:
-        for note in result.notes:
-            say(note)
-    for one in demonstrations:
-        for note in one.notes:
-            say(f"{one.id}: {note}")
-    finish([*failed, *(line for _, result in good for line in (*result.damage, *result.skipped))])
+        click.echo(trial_table(rows))
+        if document.get("gain"):
+            click.echo("\n" + gain_table(document["gain"]))
+    for line in [note for result in results for note in result.notes]:
+        say(line)
+    for line in [f"{one.id}: {note}" for one in demonstrations for note in one.notes]:
+        say(line)
+    finish([*failed, *(line for result in results for line in (*result.damage, *result.skipped))])
+
+
+def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
+    """What the user said about the log, as it is written down."""
+    return {
+        "topics": {role: list(names) for role, names in options.topics.items()},
+        "time": options.time.value,
+        "frame": options.frame,
+        "wrench_frame": options.wrench_frame,
+        "map": None if map_file is None else map_file.name,
+    }
+
+
+#: The hashes of a recording's files, and what came out of it.
+_Result = tuple[tuple[Input, ...], Extraction]
 
 
 def _all_extracted(
-    logs: tuple[Path, ...], settings: ExtractSettings, topics: dict[str, str]
-) -> tuple[list[tuple[Input, Extraction]], list[str]]:
-    """What came out of each log, and what is wrong with those of which nothing did."""
-    good: dict[str, tuple[Input, Extraction]] = {}
-    failed: list[NavirlError] = []
-    work = partial(_extracted, settings=settings, topics=topics)
-    with progress_bar("extract", len(logs)) as update:
-        for number, (log, result) in enumerate(zip(logs, map_in_order(work, logs), strict=True), start=1):
+    logs: Sequence[Path], settings: ExtractSettings, options: LoadOptions, *, join: bool
+) -> tuple[list[_Result], list[str]]:
+    """What came out of each recording, and what is wrong with those of which nothing did."""
+    refused: list[LogError] = []
+    # where all are pieces of one recording none may be missing
+    sources = sources_of(logs, join=join, refused=None if join else refused)
+    good: dict[tuple[str, ...], _Result] = {}
+    failed: list[NavirlError] = [*refused]
+    sizes = [sum(path.stat().st_size for path in source.files) for source in sources]
+    done = 0
+    with bytes_bar("extract") as update:
+        # a lone recording is read here, so that the bar can follow its bytes
+        work = partial(_extracted, settings=settings, options=options, progress=update if len(sources) == 1 else None)
+        for source, size, result in zip(sources, sizes, map_in_order(work, sources), strict=True):
             if isinstance(result, NavirlError):
                 failed.append(result)
-            elif result[0].sha256 in good:
-                failed.append(DemonstrationError(f"{log}: the same recording as {good[result[0].sha256][0].file}"))
+            elif (key := tuple(sorted(file.sha256 for file in result[0]))) in good:
+                failed.append(DemonstrationError(f"{source.name}: the same recording as {good[key][1].log}"))
             else:
-                good[result[0].sha256] = result
-            update(number, log.name)
+                good[key] = result
+            done += size
+            update(done, sum(sizes))
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
@@ -144,48 +224,14 @@ def _all_extracted(
     return list(good.values()), [f"left out: {error}" for error in failed]
 
 
-def _extracted(log: Path, settings: ExtractSettings, topics: dict[str, str]) -> tuple[Input, Extraction] | NavirlError:
-    """One log's demonstrations, or why there are none: one bad log must not spoil the others."""
+def _extracted(
+    source: Source, settings: ExtractSettings, options: LoadOptions, progress: Progress | None
+) -> _Result | NavirlError:
+    """One recording's demonstrations, or why there are none: one bad log must not spoil the others."""
     try:
-        return Input.of(log), extract_one(load_recording(log, topics), settings)
+        with ThreadPoolExecutor(1) as pool:
+            hashes = pool.submit(lambda: tuple(Input.of(path) for path in source.files))
+            extraction = extract_one(load_recording(source, options, progress), settings)
+            return hashes.result(), extraction
     except NavirlError as error:
         return error
-
-
-#: Columns of the table, and how their numbers are written.
-FORMATS = {
-    "trial": "",
-    "condition": "",
-    "cycle": "d",
-    "duration s": ".1f",
-    "length m": ".2f",
-    "cells": "d",
-    "contacts": "d",
-    "contact %": ".0f",
-    "peak N": ".1f",
-    "impulse Ns": ".1f",
-    "direction deg": ".0f",
-}
-
-
-def _row(d: Demonstration) -> dict[str, Any]:
-    """One trial of the table."""
-    strongest = max(d.contacts, key=lambda contact: hypot(*contact.impulse_ns), default=None)
-    values = (
-        d.id,
-        d.condition.value,
-        d.cycle,
-        d.duration_s,
-        path_length_m(d.xy_m),
-        len(d.cells),
-        len(d.contacts),
-        100 * d.contact_s / d.duration_s,
-        max((contact.peak_n for contact in d.contacts), default=None),
-        sum(hypot(*contact.impulse_ns) for contact in d.contacts),
-        None if strongest is None else degrees(strongest.direction_rad),
-    )
-    return dict(zip(FORMATS, values, strict=True))
-
-
-def _shown(name: str, value: Any) -> str:
-    return "-" if value is None else format(value, FORMATS[name])

@@ -32,6 +32,32 @@ samples_option = click.option(
 demos_argument = click.argument("demos", type=FilePath)
 
 
+class Pair(click.ParamType):  # type: ignore[type-arg]
+    """``NAME=VALUE``."""
+
+    name = "name=value"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        """Split at the first equals sign."""
+        name, equals, rest = str(value).partition("=")
+        if not (name and equals and rest):
+            self.fail(f"expected NAME=VALUE, found {value!r}", param, ctx)
+        return name, rest
+
+
+topic_option = click.option(
+    "--topic", "topics", multiple=True, type=Pair(), help="ROLE=/topic where several fit, e.g. wrench=/ft; repeatable."
+)
+
+
+def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ...]]:
+    """What ``--topic`` was given as."""
+    chosen: dict[str, tuple[str, ...]] = {}
+    for role, topic in topics:
+        chosen[role] = (*chosen.get(role, ()), topic)
+    return chosen
+
+
 def demonstrations_in(path: Path) -> list[Demonstration]:
     """The demonstrations of a file that holds some.
 
@@ -77,19 +103,6 @@ class Point(click.ParamType):  # type: ignore[type-arg]
         return x, y
 
 
-class Pair(click.ParamType):  # type: ignore[type-arg]
-    """``NAME=VALUE``."""
-
-    name = "name=value"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
-        """Split at the first equals sign."""
-        name, equals, rest = str(value).partition("=")
-        if not (name and equals and rest):
-            self.fail(f"expected NAME=VALUE, found {value!r}", param, ctx)
-        return name, rest
-
-
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Columns aligned by their widest entry; those that begin with a digit or a sign to the right."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
@@ -117,6 +130,30 @@ def finish(lost: Sequence[str]) -> None:
         say(line)
     if lost:
         click.get_current_context().exit(3)
+
+
+@contextmanager
+def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr over the bytes of one log after the other, where stderr is a terminal.
+
+    Args:
+        label: What goes on.
+
+    Yields:
+        A function that takes the bytes done and the bytes in all.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _done, _total: None
+        return
+    with click.progressbar(length=1, label=label, file=sys.stderr, width=30) as bar:
+
+        def update(done: int, total: int) -> None:
+            if done < bar.pos:
+                bar.pos = 0
+            bar.length = max(total, 1)
+            bar.update(done - bar.pos)
+
+        yield update
 
 
 @contextmanager

@@ -85,6 +85,16 @@ def recording_notes(recording: Recording, pushes: Pushes, push: PushSettings) ->
     return [f"{recording.log}: {note}" for note in notes]
 
 
+def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
+    """Where in a trial the localisation moves the robot at once."""
+    jumps = [jump for jump in recording.jumps if start_ns <= jump.t_ns <= stop_ns]
+    if not jumps:
+        return []
+    largest = max(jumps, key=lambda jump: jump.size_m)
+    how = "jumps" if len(jumps) == 1 else f"jumps {len(jumps)} times, at most"
+    return [f"the localisation {how} by {largest.size_m:.2f} m at {(largest.t_ns - start_ns) / 1e9:.1f} s"]
+
+
 def people_notes(recording: Recording, people: FloatArray) -> list[str]:
     """Nobody there at all, or where none can stand: in a wall, or off the map."""
     if len(people) == 0:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from navirl_cli.demos.bias import bias_of
 from navirl_cli.demos.demonstration import Contact
 from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.errors import LogError
@@ -12,8 +12,6 @@ from navirl_cli.logs.recording import Recording
 
 #: A hand on a robot moves its force below about 5 Hz; gear and wheel noise lie above.
 CUTOFF_HZ = 5.0
-#: Length of the stretches whose quietness is judged, s.
-STRETCH_S = 0.25
 #: Contacts that break off for less than this are one, s; shorter ones are bumps.
 MIN_GAP_S = 0.15
 MIN_CONTACT_S = 0.08
@@ -25,6 +23,7 @@ class PushSettings:
 
     #: Horizontal force above which a contact begins, N; it ends below half of it.
     begins_n: float = 3.0
+    #: The force is low-passed below this frequency, Hz.
     cutoff_hz: float = CUTOFF_HZ
 
 
@@ -36,6 +35,8 @@ class Pushes:
     t_ns: IntArray
     #: (n, 2) N, map frame, bias removed, low-passed.
     force_n: FloatArray
+    #: (n, 2) N, base frame: forward and to the left, bias removed, not filtered.
+    base_n: FloatArray
     #: (c, 2) first and last sample of every contact, both included.
     spans: IntArray
     #: Standard deviation of each component of the low-passed force without contact, N.
@@ -45,8 +46,11 @@ class Pushes:
 def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     """Find the person's pushes in a recording.
 
-    The bias is constant in the sensor's frame (offset of the bridge, and the handle's weight while the robot stays
-    level), so that it is removed there, then the force is turned through the base frame into the map frame.
+    The bias (offset of the bridge, and the handle's weight while the robot stays level) changes slowly in the sensor's
+    frame, so that it is removed there; then the force is turned through the base frame into the map frame. Of a sensor
+    that moves on the robot the handle's weight is no constant in its own frame: what of it turns with the sensor is
+    taken for a push, unless the sensor moves slowly. Where the sensor sits does not matter: a force is the same at any
+    point of a rigid body, and the torque, to which the lever arm adds, is not used.
 
     Raises:
         LogError: The recording holds too few wrench messages.
@@ -60,45 +64,18 @@ def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
             f"{recording.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
             f"{(int(wrench.t_ns[0]) - int(recording.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
         )
-    rate = 1e9 / float(np.median(np.diff(wrench.t_ns)))
-    bias, quiet = quiet_bias(wrench.force_n, rate)
-    smooth = _low_pass(wrench.force_n - bias, rate, settings.cutoff_hz)
-    base = smooth @ wrench.to_base.T
+    seconds = (wrench.t_ns - wrench.t_ns[0]) / 1e9
+    bias, quiet = bias_of(seconds, wrench.force_n, settings.begins_n)
+    base = np.einsum("...ij,...j->...i", wrench.to_base[..., :2, :], wrench.force_n - bias)
+    smooth = _low_pass(base, 1 / float(np.median(np.diff(seconds))), settings.cutoff_hz)
     yaw = np.interp(wrench.t_ns, recording.t_ns, np.unwrap(recording.yaw_rad))
     cos, sin = np.cos(yaw), np.sin(yaw)
-    force = np.stack([cos * base[:, 0] - sin * base[:, 1], sin * base[:, 0] + cos * base[:, 1]], axis=1)
+    force = np.stack([cos * smooth[:, 0] - sin * smooth[:, 1], sin * smooth[:, 0] + cos * smooth[:, 1]], axis=1)
     size = np.hypot(*force.T)
     # The median of a Rayleigh distribution: a push beside a quiet stretch leaks into it through the filter.
     noise = float(np.median(size[quiet]) / np.sqrt(2 * np.log(2)))
     spans = hysteresis(size, settings.begins_n, settings.begins_n / 2)
-    return Pushes(wrench.t_ns, force, _tidy(spans, wrench.t_ns), noise)
-
-
-def quiet_bias(force_n: FloatArray, rate_hz: float) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """The sensor's bias from the stretches in which nobody pushes.
-
-    A stretch is quiet when it varies hardly more than the quietest tenth of all. A steady push varies little too, but
-    most quiet stretches are free of contact, so that their median is, and stretches far from it are left out.
-
-    Args:
-        force_n: (n, 3) N, sensor frame.
-        rate_hz: Samples a second.
-
-    Returns:
-        (3,) bias in N, and (n,) samples of the quiet stretches that it comes from.
-    """
-    length = max(4, round(STRETCH_S * rate_hz))
-    count = max(1, len(force_n) // length)
-    blocks = force_n[: count * length].reshape(count, -1, 3)
-    spread = np.sqrt(blocks.var(axis=1).sum(axis=1))
-    quiet = spread <= 2 * np.quantile(spread, 0.1) + 1e-12
-    means = blocks.mean(axis=1)
-    centre = np.median(means[quiet], axis=0)
-    away = np.sqrt(((means - centre) ** 2).sum(axis=1))
-    quiet &= away <= 3 * np.median(away[quiet]) + 1e-12
-    samples = np.zeros(len(force_n), dtype=bool)
-    samples[: count * length] = np.repeat(quiet, blocks.shape[1])
-    return means[quiet].mean(axis=0), samples
+    return Pushes(wrench.t_ns, force, base, _tidy(spans, wrench.t_ns), noise)
 
 
 def hysteresis(size: FloatArray, high: float, low: float) -> IntArray:

@@ -41,6 +41,46 @@ class Contact:
 
 
 @dataclass(frozen=True)
+class PersonTrack:
+    """Where one person was during a trial."""
+
+    name: str
+    #: (k,) s since the trial's start, increasing; empty of a person who stands still.
+    t_s: FloatArray
+    #: (k, 2) m, map frame.
+    xy_m: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check shapes and order."""
+        if self.t_s.ndim != 1 or self.xy_m.shape != (len(self.t_s), 2):
+            raise DemonstrationError(
+                f"track of person {self.name}: t_s and xy_m need the shapes (k,) and (k, 2), "
+                f"found {self.t_s.shape} and {self.xy_m.shape}"
+            )
+        if not (np.isfinite(self.t_s).all() and np.isfinite(self.xy_m).all() and (np.diff(self.t_s) > 0).all()):
+            raise DemonstrationError(f"track of person {self.name}: needs finite places at increasing times")
+
+    @property
+    def mean_m(self) -> FloatArray:
+        """(2,) mean place over the time from first to last sight, on straight lines between sights, m.
+
+        Raises:
+            IndexError: The track is empty; the place of who stands still is in people_m.
+        """
+        # From the first place on, so that who stands still has just that as the mean, to the last digit.
+        from_first = self.xy_m - self.xy_m[0]
+        if len(self.t_s) > 1:
+            from_first = np.trapezoid(from_first, self.t_s[:, None], axis=0)[None] / (self.t_s[-1] - self.t_s[0])
+        mean: FloatArray = self.xy_m[0] + from_first[0]
+        return mean
+
+    @property
+    def spread_m(self) -> float:
+        """Largest distance from the mean place, m; 0 of a person who stands still."""
+        return float(np.hypot(*(self.xy_m - self.mean_m).T).max()) if len(self.t_s) else 0.0
+
+
+@dataclass(frozen=True)
 class Demonstration:
     """A trial: the path that was driven, the forces on the way, and the scene around it."""
 
@@ -65,7 +105,7 @@ class Demonstration:
     contacts: tuple[Contact, ...]
     #: The announced goal, m, map frame.
     goal_m: tuple[float, float]
-    #: (p, 2) m, map frame: where the people stand.
+    #: (p, 2) m, map frame: where the people stand; the mean over the trial of one who moves.
     people_m: FloatArray
     #: Radius of the robot, m.
     robot_radius_m: float
@@ -75,6 +115,8 @@ class Demonstration:
     cells: IntArray
     #: File name of the log.
     log: str = ""
+    #: How the people moved, one track for each of people_m in the same order; none at all where nobody did.
+    tracks: tuple[PersonTrack, ...] = ()
     #: What a reader of the results should know of this trial.
     notes: tuple[str, ...] = field(default=())
 
@@ -93,6 +135,8 @@ class Demonstration:
                 self._refuse(f"{name} needs the shape {shape}, found {value.shape}")
             if value is not None and not np.isfinite(value).all():
                 self._refuse(f"{name} holds values that are not finite")
+        if len(self.tracks) not in {0, len(self.people_m)}:
+            self._refuse(f"needs a track for each of its {len(self.people_m)} people, found {len(self.tracks)}")
         if n < 2 or not (np.diff(self.t_s) > 0).all():
             self._refuse("needs at least two poses at increasing times")
         if len(self.cells) < 2:

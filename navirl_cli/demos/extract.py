@@ -6,10 +6,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from navirl_cli.demos.checks import check_cells, check_gaps, check_goal, check_start, people_notes, recording_notes
+from navirl_cli.demos.checks import (
+    check_cells,
+    check_gaps,
+    check_goal,
+    check_start,
+    jump_notes,
+    people_notes,
+    recording_notes,
+)
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
+from navirl_cli.demos.gain import Gain, gain_of
+from navirl_cli.demos.grid import Grid, IntArray, grid_from_occupancy
+from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Split, Trial, trials_of
 from navirl_cli.errors import DemonstrationError, NavirlError
@@ -34,12 +44,16 @@ class ExtractSettings:
     people_m: tuple[tuple[float, float], ...] | None = None
     #: In place of the log's goals; a log that announces none has it from its start.
     goal_m: tuple[float, float] | None = None
+    #: Whether to estimate how fast the robot gives way to a push.
+    gain: bool = False
 
 
 @dataclass(frozen=True)
 class Extraction:
     """What came out of one recording."""
 
+    #: Name of the log.
+    log: str
     demonstrations: tuple[Demonstration, ...]
     #: Trials found, those that were skipped included.
     trials: int
@@ -49,6 +63,8 @@ class Extraction:
     damage: tuple[str, ...]
     #: What is odd about the recording; notes on a trial stand in its demonstration.
     notes: tuple[str, ...]
+    #: How fast the robot gives way to a push; None where nobody asked, or nobody pushed.
+    gain: Gain | None = None
 
 
 def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
@@ -73,7 +89,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     ).resampled(settings.resolution_m)
     pushes = pushes_of(recording, settings.push)
     trials = trials_of(recording, settings.split)
-    participant = settings.participant or recording.participant or recording.log.removesuffix(".mcap")
+    participant = settings.participant or recording.participant or recording.log.partition(".mcap")[0]
     found: list[Demonstration] = []
     skipped: list[tuple[int, str]] = []
     for number, trial in enumerate(trials, start=1):
@@ -87,7 +103,10 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
-    return Extraction(tuple(found), len(trials), lines, recording.damage, tuple(notes))
+    gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain else None
+    if settings.gain and gain is None:
+        notes.append(f"{recording.log}: no trial holds a push to the side, so that its gain is unknown")
+    return Extraction(recording.log, tuple(found), len(trials), lines, recording.damage, tuple(notes), gain)
 
 
 def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
@@ -131,41 +150,45 @@ def _demonstration(
     """One trial as a demonstration."""
     span = slice(trial.first, trial.stop)
     t_ns, xy = recording.t_ns[span], recording.xy_m[span]
+    start_ns, stop_ns = int(t_ns[0]), int(t_ns[-1])
     travelled = float(np.hypot(*(xy - xy[0]).T).max())
     if travelled < MIN_TRAVEL_M:
         raise DemonstrationError(f"the robot gets no farther than {travelled:.2f} m: an empty trial")
     check_gaps(recording, trial, pushes)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
-    people = _people(recording, settings, t_ns[0], t_ns[-1])
-    check_start(people, xy[0], settings.robot_radius_m)
+    people = _people(recording, settings, start_ns, stop_ns)
+    check_start(people.people_m, xy[0], settings.robot_radius_m)
     cells = rasterize(xy, grid, settings.rasterizer)
     free = grid.freed(cells)
     check_cells(cells, xy, grid, settings.robot_radius_m)
     if not trial.arrived:
         check_goal(free, xy[0], goal)
-    contacts = contacts_within(pushes, int(t_ns[0]), int(t_ns[-1]))
-    steered = _steered_s(recording, int(t_ns[0]), int(t_ns[-1])) > STEERED_S
-    declared = _declared(recording, int(t_ns[0]), int(t_ns[-1]))
+    contacts = contacts_within(pushes, start_ns, stop_ns)
+    steered = _steered_s(recording, start_ns, stop_ns) > STEERED_S
+    declared = _declared(recording, start_ns, stop_ns)
     observed = Condition.JOYSTICK if steered else Condition.FORCE if contacts else Condition.AUTONOMOUS
+    path_notes = _path_notes(trial, cells, grid, float(np.hypot(*(xy[-1] - goal))))
+    jumps = jump_notes(recording, start_ns, stop_ns)
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
         condition=observed if declared.condition is None else _condition(declared.condition),
         corrected=bool(contacts) or steered,
         cycle=declared.cycle,
-        start_ns=int(t_ns[0]),
-        t_s=(t_ns - t_ns[0]) / 1e9,
+        start_ns=start_ns,
+        t_s=(t_ns - start_ns) / 1e9,
         xy_m=xy,
         yaw_rad=recording.yaw_rad[span],
         force_n=np.stack([np.interp(t_ns, pushes.t_ns, axis) for axis in pushes.force_n.T], axis=1),
         contacts=contacts,
         goal_m=goal,
-        people_m=people,
+        people_m=people.people_m,
         robot_radius_m=settings.robot_radius_m,
         grid=free,
         cells=cells,
         log=recording.log,
-        notes=(*_path_notes(trial, cells, grid, float(np.hypot(*(xy[-1] - goal)))), *people_notes(recording, people)),
+        tracks=people.tracks,
+        notes=(*path_notes, *jumps, *people.notes, *people_notes(recording, people.people_m)),
     )
 
 
@@ -180,18 +203,11 @@ def _path_notes(trial: Trial, cells: IntArray, grid: Grid, from_goal_m: float) -
     return notes
 
 
-def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> FloatArray:
-    """(p, 2) m: mean places over the trial, by place in the message; the last known ones where it says none."""
+def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> People:
+    """The people of a trial: those whom the user placed, else those of the log."""
     if settings.people_m is not None:
-        return np.array(settings.people_m)
-    if not recording.people_m:
-        return np.zeros((0, 2))
-    first, stop = np.searchsorted(recording.people_t_ns, [start_ns, stop_ns])
-    during = recording.people_m[first:stop] or (recording.people_m[max(first - 1, 0)],)
-    most = max(len(people) for people in during)
-    whole = [people for people in during if len(people) == most]
-    mean: FloatArray = np.mean(whole, axis=0)
-    return mean
+        return People(np.array(settings.people_m))
+    return people_during(recording, start_ns, stop_ns)
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

@@ -1,270 +1,233 @@
-"""A log's columns put on one clock and into one frame."""
+"""From a log's columns to a recording: one clock, one fixed frame, numbers that can be true."""
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.frames import Transforms, TransformTree
-from navirl_cli.logs.reader import Contents, Series, read, scan
-from navirl_cli.logs.recording import (
-    SESSION_RECORD,
-    Declared,
-    FloatArray,
-    IntArray,
-    Occupancy,
-    Recording,
-    Wrench,
-)
-from navirl_cli.logs.stamps import STAMP, Clock
-from navirl_cli.logs.topics import topics_by_role
+from navirl_cli.logs.clocks import Clock, Stamped, TimeSource, in_order
+from navirl_cli.logs.frames import TransformTree
+from navirl_cli.logs.maps import map_in, occupancy_of
+from navirl_cli.logs.parts import Damage
+from navirl_cli.logs.people import goals_of, people_of
+from navirl_cli.logs.poses import poses_of
+from navirl_cli.logs.reader import Contents, Progress, ReadResult, read, scan
+from navirl_cli.logs.recording import FloatArray, IntArray, Occupancy, Recording, Wrench
+from navirl_cli.logs.session import session_of
+from navirl_cli.logs.setting import Setting
+from navirl_cli.logs.sound import FORCES
+from navirl_cli.logs.sources import Source
+from navirl_cli.logs.table import Table, wants
+from navirl_cli.logs.topics import Choice, choices, is_missed, refusal, topics_of
+from navirl_cli.logs.transforms import Link, links_of
+from navirl_cli.logs.whole import Opened, open_log
 
-FRAME = "header.frame_id"
-_POSITION = tuple(f"pose.pose.position.{axis}" for axis in "xyz")
-_ORIENTATION = tuple(f"pose.pose.orientation.{axis}" for axis in "xyzw")
-_FORCE = tuple(f"wrench.force.{axis}" for axis in "xyz")
-#: What is read as columns; of other roles whole messages are read.
-_FIELDS: dict[str, tuple[str, ...]] = {
-    "wrench": (STAMP, FRAME, *_FORCE),
-    "odometry": (STAMP, FRAME, "child_frame_id", *_POSITION, *_ORIENTATION),
-}
-_NS = 1_000_000_000
+#: The frame of a map from a file, as Nav2's map server names it.
+_MAP_FRAME = "map"
+#: An axis of a joystick this near to 0 rests there, if it is so in this share of the messages.
+_STICK_REST, _RESTS = 0.05, 0.05
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """What a user can say about a log."""
+
+    #: Topics by role, where there are several that could be meant.
+    topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    time: TimeSource = TimeSource.HEADER
+    #: The frame that everything is brought into, in place of the map's.
+    frame: str | None = None
+    #: The frame that the wrench is given in, in place of its header's.
+    wrench_frame: str | None = None
+    #: A map in place of the log's, in the fixed frame.
+    occupancy: Occupancy | None = None
+    #: Refuse a log of which something is lost.
+    strict: bool = False
 
 
 def load_recording(
-    path: Path, chosen: Mapping[str, str] | None = None, progress: Callable[[int, int], None] | None = None
+    source: Source | Path, options: LoadOptions | None = None, progress: Progress | None = None
 ) -> Recording:
     """Read what an extraction needs from a log.
 
     Args:
-        path: An MCAP file.
-        chosen: Topics by role, where there are several that could be meant.
+        source: A recording's files, or its only one.
+        options: The user's choices.
         progress: Called with bytes done and bytes in all.
 
     Returns:
-        The recording, in the frame of the log's map, on the clock of the header stamps.
+        The recording, in the map's or the chosen frame, on the clock of the odometry's stamps.
 
     Raises:
-        LogError: The log cannot be read or lacks what is needed.
+        LogError: The log cannot be read or lacks what is needed, or something is lost and options are strict.
         FrameError: tf does not connect the frames.
     """
-    contents = scan(path)
-    roles = topics_by_role(contents, chosen or {})
-    result = read(path, {topic: _FIELDS.get(role) for role, topic in roles.items()}, progress)
-    series = {role: result.series[topic] for role, topic in roles.items() if topic in result.series}
-    for role in ("wrench", "odometry", "map"):
-        if role not in series or len(series[role]) == 0:
-            raise LogError(f"{path}: no message on the {role} topic {roles[role]} could be read")
-    clock = Clock.of(series["odometry"])
-    tree = TransformTree.from_messages(_messages(series, "tf_static"), _messages(series, "tf"))
-    message = series["map"].messages[-1]
-    fixed = message.header.frame_id
-    odometry, notes = _sound(path, roles["odometry"], series["odometry"], (*_POSITION, *_ORIENTATION))
-    t_ns, xy, yaw = _poses(path, odometry, clock, tree, fixed, notes)
-    goal_t_ns, goal_m = _placed(path, "goal", series, clock, tree, fixed, notes)
-    people_t_ns, people_m = _placed(path, "people", series, clock, tree, fixed, notes)
-    wrench, dropped = _sound(path, roles["wrench"], series["wrench"], _FORCE)
-    session = _session(contents)
-    command_t_ns, command = _deflection(series, clock)
+    if isinstance(source, Path):
+        source = Source(source.name, (source,))
+    options = options or LoadOptions()
+    with ExitStack() as stack:
+        # what is compressed as a whole is decompressed once
+        files = [stack.enter_context(open_log(file)) for file in source.files]
+        return _loaded(source, files, options, progress)
+
+
+def _loaded(source: Source, files: Sequence[Opened], options: LoadOptions, progress: Progress | None) -> Recording:
+    """The recording of files that are open."""
+    log = source.name
+    contents = [scan(file) for file in files]
+    tables, damage = _read(log, contents, files, options, progress)
+    setting, drawn = _setting(log, tables, options)
+    poses = poses_of(next(iter(tables["odometry"]), None), setting)
+    wrench = _wrench(tables["wrench"][0], setting, poses.base, options.wrench_frame)
+    people_t_ns, people = people_of(tables["people"], setting)
+    goal_t_ns, goal_m = goals_of(next(iter(tables["goal"]), None), setting)
+    command_t_ns, command = _commands(tables["joystick"], setting.clock)
+    participant, declared = session_of(log, contents)
+    occupancy = occupancy_of(drawn, setting)
+    lost = (*map(str, (*source.damage, *damage)), *setting.lost)
+    if lost and options.strict:
+        raise LogError(f"{log}: damaged, and --strict refuses it: {'; '.join(lost)}")
     return Recording(
-        log=path.name,
-        participant=session.get("participant"),
-        t_ns=t_ns,
-        xy_m=xy,
-        yaw_rad=yaw,
-        wrench=_wrench(path, wrench, clock, tree, str(odometry.columns["child_frame_id"][0])),
-        occupancy=_occupancy(path, message),
+        log=log,
+        participant=participant,
+        t_ns=poses.t_ns,
+        xy_m=poses.xy_m,
+        yaw_rad=poses.yaw_rad,
+        wrench=wrench,
+        occupancy=occupancy,
         goal_t_ns=goal_t_ns,
-        goal_m=np.concatenate([*goal_m, np.zeros((0, 2))]),
+        goal_m=goal_m,
         people_t_ns=people_t_ns,
-        people_m=tuple(people_m),
+        people=people,
         command_t_ns=command_t_ns,
         command=command,
-        declared=_declared(path, session),
-        damage=tuple(str(damage) for damage in result.damage),
-        notes=(*notes, *dropped, *clock.notes(path)),
+        declared=declared,
+        velocity_m_s=poses.velocity_m_s,
+        jumps=poses.jumps,
+        damage=lost,
+        notes=(*source.notes, *setting.notes, *(f"{log}: {note}" for note in setting.clock.notes)),
     )
 
 
-def _messages(series: Mapping[str, Series], role: str) -> list[Any]:
-    return series[role].messages if role in series else []
+def _read(
+    log: str, contents: Sequence[Contents], files: Sequence[Opened], options: LoadOptions, progress: Progress | None
+) -> tuple[dict[str, list[Table]], tuple[Damage, ...]]:
+    """What was read of every role's topics, and the damage."""
+    topics = topics_of(contents)
+    picked = choices(log, topics, options.topics)
+    if options.occupancy is not None:
+        del picked["map"]
+    for choice in picked.values():
+        if is_missed(choice, picked):
+            raise refusal(log, topics, choice)
+    kinds = {topic.name: choice.kind(topic) for choice in picked.values() if choice.topics for topic in choice.topics}
+    maps = {topic.name for topic in picked["map"].topics} if "map" in picked else set()
+    result = read(files, wants(kinds), progress, latest=maps)
+    return {role: _tables(log, choice, result) for role, choice in picked.items()}, result.damage
 
 
-def _deflection(series: Mapping[str, Series], clock: Clock) -> tuple[IntArray, FloatArray]:
-    """(c,) ns and (c,) how far the joystick is from where its axes rest: a pad's triggers rest at 1."""
-    joystick = series.get("joystick")
-    if joystick is None or len(joystick) == 0:
-        return np.zeros(0, dtype=np.int64), np.zeros(0)
-    width = max(len(message.axes) for message in joystick.messages)
-    axes = np.full((len(joystick), max(width, 1)), np.nan)
-    for row, message in enumerate(joystick.messages):
-        axes[row, : len(message.axes)] = message.axes
-    axes = np.where(np.isfinite(axes), axes, 0.0)
-    away = np.abs(axes - np.median(axes, axis=0)).max(axis=1)
-    times = clock.stamps(joystick)
-    order = np.argsort(times, kind="stable")
-    return times[order], away[order]
+def _setting(
+    log: str, tables: Mapping[str, Sequence[Table]], options: LoadOptions
+) -> tuple[Setting, tuple[Occupancy, str]]:
+    """Clock and frames, and the map with its frame."""
+    reference = (*tables["odometry"], *tables["wrench"])[0]
+    clock = Clock(reference.stamped(), options.time)
+    tree = TransformTree(
+        [link for table in tables["tf_static"] for link in links_of(_tf_columns(table), table.owner_counts)],
+        [link for table in tables["tf"] for link in _moving(table, clock)],
+    )
+    drawn = map_in(log, tables["map"]) if options.occupancy is None else (options.occupancy, "")
+    setting = Setting(log, clock, tree, options.frame or drawn[1] or _MAP_FRAME)
+    for (parent, child), count in tree.ignored.items():
+        setting.note(
+            f"{count} transforms {parent} -> {child} cannot be true, or were sent before the clock ran; ignored"
+        )
+    return setting, drawn
 
 
-def _sound(path: Path, topic: str, series: Series, fields: tuple[str, ...]) -> tuple[Series, list[str]]:
-    """A series without messages whose numbers are not finite, or whose quaternion is none; and a note of them."""
-    values = np.stack([series.columns[name] for name in fields], axis=1)
-    good = np.isfinite(values).all(axis=1)
-    turn = [fields.index(name) for name in _ORIENTATION if name in fields]
-    if turn:
-        good &= np.nan_to_num(np.square(values[:, turn]).sum(axis=1)) > 1e-6
-    if good.all():
-        return series, []
-    if not good.any():
-        raise LogError(f"{path}: topic {topic}: expected numbers, found none that are finite in any of its messages")
-    columns = {name: column[good] for name, column in series.columns.items()}
-    kept = replace(series, log_time_ns=series.log_time_ns[good], columns=columns)
-    return kept, [f"{path.name}: {int((~good).sum())} messages on {topic} hold no finite numbers; left out"]
+def _tables(log: str, choice: Choice, result: ReadResult) -> list[Table]:
+    """What was read of a role's topics."""
+    tables = [
+        Table.of(result.series[topic.name], choice.kind(topic))
+        for topic in choice.topics
+        if topic.name in result.series and len(result.series[topic.name])
+    ]
+    if choice.topics and not tables and choice.role.needed:
+        names = ", ".join(topic.name for topic in choice.topics)
+        reasons = [str(one) for one in result.damage if any(topic.name in one.reason for topic in choice.topics)]
+        why = f": {'; '.join(reasons)}" if reasons else ""
+        raise LogError(f"{log}: no message on the {choice.role.name} topic {names} could be read{why}")
+    return tables
 
 
-def _in_order(t_ns: IntArray) -> IntArray:
-    """Rows in order of time; of equal stamps the first."""
-    _, rows = np.unique(t_ns, return_index=True)
-    return rows
+def _tf_columns(table: Table) -> Mapping[str, NDArray[Any]]:
+    return {path: table.columns[name] for name, path in table.kind.fields.items()}
 
 
-def _poses(
-    path: Path, odometry: Series, clock: Clock, tree: TransformTree, fixed: str, notes: list[str]
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Times, positions and headings of the robot in the fixed frame."""
-    from scipy.spatial.transform import Rotation
+def _moving(table: Table, clock: Clock) -> list[Link]:
+    """Links of /tf, whose stamps may lie ahead on purpose but jump as the clock does."""
+    columns = _tf_columns(table)
+    stamps = columns["transforms[].header.stamp"]
+    return links_of(columns, table.owner_counts, clock.shifted(stamps, table.log_time_ns[table.owner]))
 
-    columns = odometry.columns
-    stamps = clock.stamps(odometry)
-    rows = _in_order(stamps)
-    frame, base = str(columns[FRAME][0]), str(columns["child_frame_id"][0])
+
+def _wrench(table: Table, setting: Setting, base: str, said: str | None) -> Wrench:
+    """Forces in the sensor's frame, and how that frame is mounted."""
+    table, own = setting.one_frame(table)
+    table = setting.measured(table, FORCES, "fx", "fy", "fz")
+    if len(table) == 0:
+        raise LogError(f"{setting.log}: topic {table.topic}: expected forces, found none that are finite")
+    frame = said or own
+    if not frame:
+        setting.note(f"{table.topic} names no frame; it is taken to be {base!r}, unless --wrench-frame says otherwise")
+        frame = base
+    stamps = table.times(setting.clock)
+    notes: list[str] = []
+    rows = in_order(table.topic, stamps, notes)
+    for text in notes:
+        setting.note(text)
+    force = table.stacked("fx", "fy", "fz")[rows]
     t_ns = stamps[rows]
     try:
-        span = tree.span(fixed, frame) if frame.lstrip("/") != fixed.lstrip("/") else None
+        span = setting.tree.span(base, frame)
+        mounted = setting.tree.lookup(base, frame, t_ns[:1] if span is None else np.clip(t_ns, *span))
     except FrameError as error:
-        raise FrameError(f"{path}: odometry of {base!r} is given in frame {frame!r}: {error}") from error
-    if span is not None:
-        # Before the localisation's first word nobody knows where the robot is.
-        known = (t_ns >= span[0] - _NS) & (t_ns <= span[1] + _NS)
-        if not known.any():
-            raise FrameError(
-                f"{path}: the transform from {frame!r} to {fixed!r} is known at no time of the odometry; "
-                "check that tf and odometry are stamped by the same clock"
-            )
-        if not known.all():
-            notes.append(f"{path.name}: {int((~known).sum())} poses lie outside the time that tf covers; left out")
-        t_ns, rows = t_ns[known], rows[known]
-    into = tree.lookup(fixed, frame, t_ns)
-    points = np.stack([columns[name][rows] for name in _POSITION], axis=1)
-    turns = Rotation.from_quat(np.stack([columns[name][rows] for name in _ORIENTATION], axis=1))
-    poses = into.after(Transforms(turns, points))
-    return t_ns, poses.translation_m[:, :2], poses.yaw_rad
-
-
-def _wrench(path: Path, wrench: Series, clock: Clock, tree: TransformTree, base: str) -> Wrench:
-    """Forces in the sensor's frame, and how that frame is mounted."""
-    columns = wrench.columns
-    frame = str(columns[FRAME][0])
-    stamps = clock.stamps(wrench)
-    rows = _in_order(stamps)
-    try:
-        moves = tree.span(base, frame) is not None
-        mounted = tree.lookup(base, frame, stamps[rows[:1]])
-    except FrameError as error:
-        raise FrameError(f"{path}: the wrench is given in frame {frame!r}: {error}") from error
-    if moves:
         raise FrameError(
-            f"{path}: the wrench's frame {frame!r} moves on {base!r}: expected a fixed mounting in /tf_static; "
-            "record the wrench in a frame that is fixed on the robot"
-        )
-    force = np.stack([columns[name][rows] for name in _FORCE], axis=1)
-    return Wrench(stamps[rows], force, mounted.rotation.as_matrix()[0])
-
-
-def _occupancy(path: Path, message: Any) -> Occupancy:
-    """The map, whose axes must be those of its frame."""
-    info = message.info
-    origin, turn = info.origin.position, info.origin.orientation
-    yaw = float(2 * np.arctan2(turn.z, turn.w))
-    if abs(np.sin(yaw / 2)) > 1e-6:
-        raise LogError(
-            f"{path}: expected a map whose cells run along its frame's axes, found one turned by "
-            f"{np.degrees(yaw):.1f} degrees; save the map with an origin of yaw 0"
-        )
-    if not (0 < info.resolution < np.inf and np.isfinite([origin.x, origin.y]).all()):
-        raise LogError(
-            f"{path}: expected a map with a positive resolution and a finite origin, found {info.resolution}"
-        )
-    data = np.asarray(message.data, dtype=np.int8)
-    if data.size != info.height * info.width or data.size == 0:
-        raise LogError(
-            f"{path}: expected a map of {info.height} x {info.width} cells, found {data.size}; record the map anew"
-        )
-    # A float32 of 0.1 is 0.10000000149 as a double: the shortest decimal is what was meant.
-    resolution = float(str(np.float32(info.resolution)))
-    return Occupancy(data.reshape(info.height, info.width), resolution, (float(origin.x), float(origin.y)))
-
-
-def _placed(
-    path: Path,
-    role: str,
-    series: Mapping[str, Series],
-    clock: Clock,
-    tree: TransformTree,
-    fixed: str,
-    notes: list[str],
-) -> tuple[IntArray, list[FloatArray]]:
-    """Times of a role's messages, and the positions in each, in the fixed frame; what cannot be placed is noted."""
-    if role not in series or len(series[role]) == 0:
-        return np.zeros(0, dtype=np.int64), []
-    messages, stamps = series[role].messages, clock.stamps(series[role])
-    times, placed, lost = [], [], []
-    for t_ns, message in zip(stamps.tolist(), messages, strict=True):
-        group = message.poses if hasattr(message, "poses") else [message.pose]
-        points = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in group]).reshape(-1, 3)
-        try:
-            if message.header.frame_id.lstrip("/") != fixed.lstrip("/"):
-                points = tree.lookup(fixed, message.header.frame_id, np.full(len(points), t_ns)).apply(points)
-        except FrameError as error:
-            lost.append(str(error))
-            continue
-        if not np.isfinite(points).all():
-            lost.append("its numbers are not finite")
-            continue
-        times.append(t_ns)
-        placed.append(points[:, :2])
-    if lost:
-        notes.append(f"{path.name}: {len(lost)} messages on the {role} topic left out: {lost[0]}")
-    order = np.argsort(times, kind="stable")
-    return np.array(times, dtype=np.int64)[order], [placed[row] for row in order]
-
-
-def _session(contents: Contents) -> dict[str, str]:
-    """The experimenter's record of the session, the last where there are several."""
-    records = contents.metadata.get(SESSION_RECORD, ())
-    return records[-1] if records else {}
-
-
-def _declared(path: Path, session: Mapping[str, str]) -> tuple[Declared, ...]:
-    """What the session record says of the trials."""
-    try:
-        return tuple(_declared_trial(entry) for entry in json.loads(session.get("trials", "[]")))
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise LogError(
-            f"{path}: metadata record {SESSION_RECORD}, key trials: expected a JSON list of objects with t_ns (ns), "
-            f"cycle (1, 2, ...) and condition, found {session['trials'][:60]!r} ({error})"
+            f"{setting.log}: the wrench is given in frame {frame!r}: {error}; or say with --wrench-frame which frame "
+            "its axes are parallel to"
         ) from error
+    turns = mounted.rotation.as_matrix()
+    if span is not None:
+        setting.note(f"the wrench's frame {frame!r} moves on {base!r}; the handle's weight may not cancel out")
+    return Wrench(t_ns, force, turns[0] if span is None else turns)
 
 
-def _declared_trial(entry: Mapping[str, Any]) -> Declared:
-    """One entry, with its types checked: a number as text would go on as text."""
-    t_ns, cycle, condition = entry["t_ns"], entry.get("cycle"), entry.get("condition")
-    if type(t_ns) is not int or (cycle is not None and (type(cycle) is not int or cycle < 1)):
-        raise TypeError(f"t_ns {t_ns!r} and cycle {cycle!r} must be whole numbers, a cycle from 1 on")
-    if not (condition is None or isinstance(condition, str)):
-        raise TypeError(f"condition {condition!r} must be a text")
-    return Declared(t_ns, cycle, condition)
+def _commands(tables: Sequence[Table], clock: Clock) -> tuple[IntArray, FloatArray]:
+    """(c,) ns and (c,) how far the joystick is from where its axes rest: a stick at 0, a pad's triggers at 1."""
+    times = [np.zeros(0, dtype=np.int64)]
+    away = [np.zeros(0)]
+    for table in tables:
+        if len(table) == 0:
+            continue
+        if table.counts is None:
+            axes = table.stacked("lx", "ly", "lz", "ax", "ay", "az")
+        else:
+            axes = np.full((len(table), max(int(table.counts.max()), 1)), np.nan)
+            first = np.cumsum(table.counts) - table.counts
+            places = np.arange(len(table.columns["axes"])) - first[table.owner]
+            axes[table.owner, places] = table.columns["axes"]
+        axes = np.where(np.isfinite(axes), axes, 0.0)
+        near = np.abs(axes) < _STICK_REST
+        # what comes back to 0 rests there, wherever it is most of the time; a trigger shows 0 until it is first touched
+        back = (near & np.logical_or.accumulate(~near, axis=0)).mean(axis=0) > _RESTS
+        rest = np.where(back | (table.counts is None), 0.0, np.median(axes, axis=0))
+        away.append(np.abs(axes - rest).max(axis=1))
+        times.append(clock.times(Stamped(table.topic, table.log_time_ns, table.columns.get("stamp"), momentary=True)))
+    t_ns = np.concatenate(times)
+    order = np.argsort(t_ns, kind="stable")
+    return t_ns[order], np.concatenate(away)[order]

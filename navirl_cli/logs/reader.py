@@ -1,22 +1,20 @@
 """Reading logs: what is in a file, and its messages as columns."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from navirl_cli.errors import LogError
-from navirl_cli.logs.container import LogFile
-from navirl_cli.logs.decode import Columns, Decoder, Part, decoder, empty_columns
+from navirl_cli.logs.collect import Collector, Series
+from navirl_cli.logs.container import LogFile, threads_here
+from navirl_cli.logs.decode import IntArray, Part
 from navirl_cli.logs.parts import Batch, Channel, Damage
+from navirl_cli.logs.whole import Opened
 
-IntArray = NDArray[np.int64]
 #: Called with the bytes done and the bytes of all files.
 Progress = Callable[[int, int], None]
+#: A file by its name, or one that is open already, since it had to be decompressed as a whole.
+Log = Path | str | Opened
 
 
 @dataclass(frozen=True)
@@ -42,32 +40,14 @@ class Contents:
 
 
 @dataclass(frozen=True)
-class Series:
-    """The messages of a topic, sorted by time of receipt; equal times keep the order of files and in the file."""
-
-    topic: str
-    schema_name: str
-    #: Time of receipt in ns, shape (n,).
-    log_time_ns: IntArray
-    #: By wanted field: numbers of the field's own type, shape (n,), or (n, k) for a fixed array of k; times as int64
-    #: ns; texts as an object array of str.
-    columns: dict[str, NDArray[Any]]
-    #: Message objects, where whole messages were wanted.
-    messages: list[Any]
-
-    def __len__(self) -> int:
-        return len(self.log_time_ns)
-
-
-@dataclass(frozen=True)
 class ReadResult:
-    """Series by topic (only topics that some file has), and what could not be read."""
+    """Series by topic (only topics that some file has and that decode), and what could not be read."""
 
     series: dict[str, Series]
     damage: tuple[Damage, ...]
 
 
-def scan(path: Path | str) -> Contents:
+def scan(path: Log) -> Contents:
     """Say what is in a file, from its summary section where that is sound and complete, else from its messages.
 
     Args:
@@ -82,170 +62,197 @@ def scan(path: Path | str) -> Contents:
     with LogFile(path) as log:
         statistics = log.summary.statistics if log.summary else None
         if statistics is None or statistics.channels > len(log.channels):
-            return _walked(log)
+            return _contents(log, log.times())
         metadata = [log.metadata_at(offset) for offset in log.summary.metadata_offsets] if log.summary else []
         if len(metadata) < statistics.metadata or None in metadata:
             _ = list(log.batches(lambda _: False))
             metadata = list(log.metadata)
-        times = (statistics.start_ns, statistics.end_ns) if statistics.messages else None
+        first, last = (statistics.start_ns, statistics.end_ns) if statistics.messages else (None, None)
         counts = {channel.id: statistics.by_channel.get(channel.id, 0) for channel in log.channels}
-        return _contents(log, counts, times, [entry for entry in metadata if entry])
+        grouped = _by_name([entry for entry in metadata if entry])
+        return Contents(
+            log.path, log.profile, log.library, log.channels, counts, first, last, grouped, tuple(log.damage)
+        )
+
+
+def message_times(path: Log) -> tuple[Contents, dict[int, IntArray]]:
+    """Contents of a file, and the times of receipt of all its messages.
+
+    Payloads are read only where message indexes are missing.
+
+    Args:
+        path: An MCAP file.
+
+    Returns:
+        Its contents, and times in ns, ascending, by channel id.
+
+    Raises:
+        LogError: It is no MCAP file.
+    """
+    with LogFile(path) as log:
+        times = log.times()
+        return _contents(log, times), times
 
 
 def read(
-    paths: Path | str | Sequence[Path | str],
-    wants: Mapping[str, Sequence[str] | None],
+    paths: Log | Sequence[Log],
+    wants: Mapping[str, Sequence[str]],
     progress: Progress | None = None,
+    threads: int | None = None,
+    latest: Collection[str] = (),
 ) -> ReadResult:
     """Read topics from one or several files.
 
     Args:
         paths: MCAP files, in the order that equal times shall have.
-        wants: By topic: dotted fields such as "header.stamp" or "wrench.force.x", which become columns; None for whole
-            message objects.
+        wants: By topic: dotted fields such as "header.stamp", "wrench.force.x" or "poses[].position.x", which become
+            columns.
         progress: Called with the bytes done and the bytes of all files.
+        threads: How many decompress and decode; by default as many as there are cores, up to four.
+        latest: Topics of which only the message received last is wanted, such as maps that are sent again and again.
 
     Returns:
-        A series for each wanted topic that some file has, and the damage met on the way.
+        A series for each wanted topic that some file has, and the damage met on the way. A channel whose encoding,
+        definition or payloads are not what they should be, or that lacks a wanted field, is damage like any other.
 
     Raises:
-        LogError: A file is no MCAP file; a wanted topic is no CDR or its definition does not parse; a field does not
-            exist; no message of a topic decodes. Topics that are not wanted never matter.
+        LogError: A file is no MCAP file.
     """
-    files = [Path(paths)] if isinstance(paths, Path | str) else [Path(path) for path in paths]
-    total = sum(path.stat().st_size for path in files if path.is_file())
-    collectors: dict[str, _Collector] = {}
+    files = [paths] if isinstance(paths, Path | str | Opened) else list(paths)
+    sizes = [_size(path) for path in files]
+    collectors = {topic: Collector(topic, topic in latest) for topic in wants}
     damage: list[Damage] = []
-    done = 0
     for number, path in enumerate(files):
-        with LogFile(path) as log:
-            seen: Counter[int] = Counter()
-            for batch in log.batches(lambda channel: channel.topic in wants):
-                _collector(collectors, path, batch.channel, wants).add(number, batch)
-                seen[batch.channel.id] += len(batch.starts)
-                if progress is not None:
-                    progress(done + log.position, total)
-            for channel in log.channels:
-                if channel.topic in wants:
-                    _collector(collectors, path, channel, wants)
-            damage += log.damage or _missing(log, seen, wants)
-            done += log.size
-        damage += [note for collector in collectors.values() for note in collector.undecoded(path)]
-        if progress is not None:
-            progress(done, total)
-    return ReadResult({topic: collectors[topic].series() for topic in wants if topic in collectors}, tuple(damage))
+
+        def tell(share: float, done: int = sum(sizes[:number]), size: int = sizes[number]) -> None:
+            if progress is not None:
+                progress(done + round(share * size), sum(sizes))
+
+        parts, notes = _read_file(path, wants, collectors, tell, threads or threads_here())
+        for topic, found in parts.items():
+            collectors[topic].add(found)
+        damage += notes
+        tell(1.0)
+    series = {topic: collector.series() for topic, collector in collectors.items() if collector.decoders}
+    return ReadResult(series, tuple(damage))
+
+
+def _size(path: Log) -> int:
+    """Bytes of a file, as far as a progress bar is concerned."""
+    if isinstance(path, Opened):
+        return path.size
+    return Path(path).stat().st_size if Path(path).is_file() else 0
+
+
+def _read_file(
+    path: Log,
+    wants: Mapping[str, Sequence[str]],
+    collectors: Mapping[str, Collector],
+    progress: Callable[[float], None],
+    threads: int,
+) -> tuple[dict[str, list[Part]], list[Damage]]:
+    """The parts of one file by topic, and its damage; a file whose indexes lack messages is walked over."""
+    for trust_indexes in (True, False):
+        with LogFile(path, trust_indexes=trust_indexes) as log:
+            walk = _Walk(wants, collectors, {topic: [] for topic in wants})
+            walk.over(log, progress, threads)
+            missing = walk.missing(log)
+            texts = [*walk.spoilt(log), *missing]
+            texts += [text for topic, parts in walk.parts.items() for text in _undecoded(topic, parts)]
+            damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in texts)]
+        if not missing:
+            break
+    return walk.parts, damage
 
 
 @dataclass
-class _Collector:
-    """Gathers the parts of one topic."""
+class _Walk:
+    """One walk over a file's wanted messages."""
 
-    topic: str
-    schema_name: str
-    fields: Sequence[str] | None
-    decoders: dict[Channel, Decoder] = field(default_factory=dict)
-    parts: list[Part] = field(default_factory=list)
-    times: list[IntArray] = field(default_factory=list)
-    #: Number of the file and place in it, each of shape (n,).
-    places: list[tuple[IntArray, IntArray]] = field(default_factory=list)
-    bad: int = 0
-    seen: int = 0
+    wants: Mapping[str, Sequence[str]]
+    collectors: Mapping[str, Collector]
+    #: By topic.
+    parts: dict[str, list[Part]]
+    #: Messages met by channel.
+    seen: Counter[int] = field(default_factory=Counter)
+    #: By channel that cannot be decoded: why.
+    unusable: dict[int, str] = field(default_factory=dict)
 
-    def add(self, number: int, batch: Batch) -> None:
-        """Decode a batch of file `number`."""
-        part = self.decoders[batch.channel].decode(batch)
-        self.parts.append(part)
-        self.times.append(batch.log_time_ns[part.good])
-        order = batch.order[part.good]
-        self.places.append((np.full(len(order), number), order))
-        self.bad += int((~part.good).sum())
-        self.seen += len(part.good)
+    def over(self, log: LogFile, progress: Callable[[float], None], threads: int) -> None:
+        """Walk."""
+        for part, count in log.results(self.wanted, self.decoded, threads):
+            self.seen[part.channel.id] += count
+            parts = self.parts[part.channel.topic]
+            parts.append(part)
+            if self.collectors[part.channel.topic].latest:
+                decoded = [one for one in parts if len(one.order)]
+                parts[:] = sorted(decoded, key=lambda one: int(one.log_time_ns.max()))[-1:] or parts
+            progress(log.position / log.size)
+        for channel in log.channels:
+            self.wanted(channel)
 
-    def undecoded(self, path: Path) -> list[Damage]:
-        """Damage by payloads of this file that do not decode."""
-        bad, seen, self.bad, self.seen = self.bad, self.seen, 0, 0
-        if not bad:
-            return []
-        trouble = next(decoder.trouble for decoder in self.decoders.values() if decoder.trouble)
-        if bad == seen:
-            raise LogError(
-                f"{path}: topic {self.topic}: expected CDR messages of type {self.schema_name}, found none among "
-                f"{seen} ({trouble}); the recorder's encoding or definition is wrong: record it again"
-            )
-        reason = (
-            f"{bad} of {seen} messages of {self.topic} do not decode as {self.schema_name} and are lost ({trouble})"
-        )
-        return [Damage(path, 0, path.stat().st_size, reason)]
+    def wanted(self, channel: Channel) -> bool:
+        """Whether a channel's messages are wanted and can be decoded."""
+        if channel.topic not in self.wants:
+            return False
+        trouble = self.collectors[channel.topic].takes(channel, tuple(self.wants[channel.topic]))
+        if trouble:
+            self.unusable[channel.id] = f"topic {channel.topic}: {trouble}"
+        return not trouble
 
-    def series(self) -> Series:
-        """The sorted whole."""
-        times = np.concatenate([np.empty(0, dtype=np.int64), *self.times])
-        file_numbers = np.concatenate([np.empty(0, dtype=np.int64), *(number for number, _ in self.places)])
-        orders = np.concatenate([np.empty(0, dtype=np.int64), *(order for _, order in self.places)])
-        rows = np.lexsort((orders, file_numbers, times))
-        messages = [message for part in self.parts for message in part.messages]
-        leaves = next(iter(self.decoders.values())).leaves or {}
-        columns: Columns = {}
-        for path, empty in empty_columns(leaves, 0).items():
-            columns[path] = np.concatenate([empty, *(part.columns.pop(path) for part in self.parts)])[rows]
-        if messages:
-            messages = [messages[row] for row in rows.tolist()]
-        return Series(self.topic, self.schema_name, times[rows], columns, messages)
+    def decoded(self, batch: Batch) -> tuple[Part, int]:
+        """A batch's columns, and how many messages it has; in any thread."""
+        collector = self.collectors[batch.channel.topic]
+        decoder = collector.decoders[batch.channel]
+        newest = decoder.decode(batch.newest()) if collector.latest else None
+        part = newest if newest is not None and len(newest.order) else decoder.decode(batch)
+        return part, len(batch.starts)
 
+    def spoilt(self, log: LogFile) -> list[str]:
+        """What is lost by channels that cannot be decoded; those without messages are no loss."""
+        promised = _promised(log)
+        return [text for number, text in self.unusable.items() if promised is None or promised.get(number)]
 
-def _collector(
-    collectors: dict[str, _Collector], path: Path, channel: Channel, wants: Mapping[str, Sequence[str] | None]
-) -> _Collector:
-    """The collector of a channel's topic, with a decoder for the channel."""
-    fields = wants[channel.topic]
-    collector = collectors.setdefault(channel.topic, _Collector(channel.topic, channel.schema_name, fields))
-    if channel.schema_name != collector.schema_name:
-        raise LogError(
-            f"{path}: topic {channel.topic}: expected {collector.schema_name}, as in its other channels, found "
-            f"{channel.schema_name}; read the files apart"
-        )
-    if channel not in collector.decoders:
-        collector.decoders[channel] = decoder(path, channel, fields)
-    return collector
+    def missing(self, log: LogFile) -> list[str]:
+        """What the statistics promise beside what is there and what is known to be lost."""
+        promised = _promised(log) or {}
+        return [
+            f"{count} messages of {channel.topic} promised by the statistics, {self.seen[channel.id]} are there"
+            for channel in log.channels
+            if channel.topic in self.wants
+            and channel.id not in self.unusable
+            and (count := promised.get(channel.id, 0)) > self.seen[channel.id] + log.lost.get(channel.id, 0)
+        ]
 
 
-def _missing(log: LogFile, seen: Mapping[int, int], wants: Mapping[str, Any]) -> list[Damage]:
-    """Damage by messages that the statistics record promises and that are not there."""
-    statistics = log.summary.statistics if log.summary else None
-    if statistics is None:
+def _promised(log: LogFile) -> Mapping[int, int] | None:
+    """Number of messages by channel as the statistics have it, None without statistics."""
+    return log.summary.statistics.by_channel if log.summary and log.summary.statistics else None
+
+
+def _undecoded(topic: str, parts: Sequence[Part]) -> list[str]:
+    """What is lost by payloads that do not decode."""
+    seen = sum(part.count for part in parts)
+    bad = seen - sum(len(part.order) for part in parts)
+    if not bad:
         return []
-    return [
-        Damage(
-            log.path,
-            0,
-            log.size,
-            f"{promised} messages of {channel.topic} promised by the statistics, {seen.get(channel.id, 0)} are there",
-        )
-        for channel in log.channels
-        if channel.topic in wants and (promised := statistics.by_channel.get(channel.id, 0)) > seen.get(channel.id, 0)
-    ]
+    trouble = next(part.trouble for part in parts if part.trouble)
+    name = parts[0].channel.schema_name
+    many = f"all {seen}" if bad == seen else f"{bad} of {seen}"
+    return [f"{many} messages of {topic} do not decode as {name} and are lost ({trouble})"]
 
 
-def _walked(log: LogFile) -> Contents:
+def _contents(log: LogFile, times: Mapping[int, IntArray]) -> Contents:
     """Contents from the messages themselves."""
-    counts: dict[int, int] = {}
-    first: list[int] = []
-    last: list[int] = []
-    for batch in log.batches(lambda _: True):
-        counts[batch.channel.id] = counts.get(batch.channel.id, 0) + len(batch.starts)
-        first.append(int(batch.log_time_ns.min()))
-        last.append(int(batch.log_time_ns.max()))
-    counts = {channel.id: counts.get(channel.id, 0) for channel in log.channels}
-    return _contents(log, counts, (min(first), max(last)) if first else None, log.metadata)
+    counts = {channel.id: len(times.get(channel.id, ())) for channel in log.channels}
+    start = min((int(one[0]) for one in times.values()), default=None)
+    end = max((int(one[-1]) for one in times.values()), default=None)
+    grouped = _by_name(log.metadata)
+    return Contents(log.path, log.profile, log.library, log.channels, counts, start, end, grouped, tuple(log.damage))
 
 
-def _contents(
-    log: LogFile, counts: dict[int, int], times: tuple[int, int] | None, metadata: list[tuple[str, dict[str, str]]]
-) -> Contents:
+def _by_name(metadata: Sequence[tuple[str, dict[str, str]]]) -> dict[str, tuple[dict[str, str], ...]]:
     grouped: dict[str, tuple[dict[str, str], ...]] = {}
     for name, values in metadata:
         grouped[name] = (*grouped.get(name, ()), values)
-    start_ns, end_ns = times or (None, None)
-    return Contents(
-        log.path, log.profile, log.library, log.channels, counts, start_ns, end_ns, grouped, tuple(log.damage)
-    )
+    return grouped

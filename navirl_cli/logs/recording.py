@@ -23,7 +23,8 @@ class Wrench:
     t_ns: IntArray
     #: (n, 3) N, sensor frame, as measured.
     force_n: FloatArray
-    #: (3, 3) rotation that turns a vector of the sensor frame into the robot's base frame.
+    #: (3, 3) rotation that turns a vector of the sensor frame into the robot's base frame; (n, 3, 3), one for each
+    #: measurement, where the sensor moves on the robot.
     to_base: FloatArray
 
 
@@ -36,6 +37,26 @@ class Occupancy:
     resolution_m: float
     #: Lower left corner, (x, y) m, fixed frame.
     origin_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Track:
+    """Where one person was seen."""
+
+    #: What the log calls the person; by places in the message ("1", "2") where it has no names.
+    name: str
+    #: (k,) ns, increasing.
+    t_ns: IntArray
+    #: (k, 2) m, fixed frame.
+    xy_m: FloatArray
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A correction by which the localisation moves the robot at once."""
+
+    t_ns: int
+    size_m: float
 
 
 @dataclass(frozen=True)
@@ -65,13 +86,16 @@ class Recording:
     #: (g,) ns and (g, 2) m, fixed frame.
     goal_t_ns: IntArray
     goal_m: FloatArray
-    #: By message: ns, and (p, 2) m, fixed frame.
+    #: (m,) ns of every message about people, those that name nobody included.
     people_t_ns: IntArray
-    people_m: tuple[FloatArray, ...]
+    people: tuple[Track, ...]
     #: (c,) ns and (c,) largest deflection of the joystick, 0..1.
     command_t_ns: IntArray
     command: FloatArray
     declared: tuple[Declared, ...] = ()
+    #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry does not say.
+    velocity_m_s: FloatArray | None = None
+    jumps: tuple[Jump, ...] = ()
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
     #: What is odd about the log, in words.

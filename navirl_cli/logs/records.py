@@ -21,9 +21,11 @@ CHUNK: Final = 0x06
 MESSAGE_INDEX: Final = 0x07
 CHUNK_INDEX: Final = 0x08
 ATTACHMENT: Final = 0x09
+ATTACHMENT_INDEX: Final = 0x0A
 STATISTICS: Final = 0x0B
 METADATA: Final = 0x0C
 METADATA_INDEX: Final = 0x0D
+SUMMARY_OFFSET: Final = 0x0E
 DATA_END: Final = 0x0F
 #: Codes from here on are free for private use: skipped, never an error.
 PRIVATE: Final = 0x80
@@ -73,8 +75,10 @@ class ChannelRecord(NamedTuple):
 
 
 class ChunkHead(NamedTuple):
-    """What stands before a chunk's compressed bytes."""
+    """What stands before a chunk's compressed bytes; times are of the first and the last message in ns."""
 
+    start_ns: int
+    end_ns: int
     size: int
     crc: int
     compression: str
@@ -85,10 +89,13 @@ class ChunkHead(NamedTuple):
 class ChunkIndex(NamedTuple):
     """Where a chunk and its message indexes stand in the file."""
 
+    start_ns: int
+    end_ns: int
     start: int
     length: int
     message_indexes: dict[int, int]
     message_index_length: int
+    compression: str
 
     @property
     def stop(self) -> int:
@@ -130,6 +137,11 @@ class _Cursor:
     def string(self) -> str:
         return self.blob().decode()
 
+    def name(self) -> str:
+        """A text of one line: what cannot be printed is escaped."""
+        text = self.string()
+        return text if text.isprintable() else "".join(map(_printable, text))
+
     def blob(self) -> bytes:
         (size,) = self.take("<I")
         if self.at + size > len(self.data):
@@ -141,42 +153,46 @@ class _Cursor:
         return dict(struct.iter_unpack("<HQ", self.blob()))
 
 
+def _printable(letter: str) -> str:
+    return letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+
+
 def parse_header(content: bytes) -> tuple[str, str]:
     """Profile and library of a header record."""
     cursor = _Cursor(content)
-    return cursor.string(), cursor.string()
+    return cursor.name(), cursor.name()
 
 
 def parse_schema(content: bytes) -> SchemaRecord:
     """A schema record; bytes of its text that are no UTF-8 (comments, mostly) are replaced."""
     cursor = _Cursor(content)
     (schema_id,) = cursor.take("<H")
-    return SchemaRecord(schema_id, cursor.string(), cursor.string(), cursor.blob().decode(errors="replace"))
+    return SchemaRecord(schema_id, cursor.name(), cursor.name(), cursor.blob().decode(errors="replace"))
 
 
 def parse_channel(content: bytes) -> ChannelRecord:
     """A channel record without its metadata."""
     cursor = _Cursor(content)
     channel_id, schema_id = cursor.take("<HH")
-    return ChannelRecord(channel_id, schema_id, cursor.string(), cursor.string())
+    return ChannelRecord(channel_id, schema_id, cursor.name(), cursor.name())
 
 
 def parse_chunk_head(content: bytes | memoryview) -> ChunkHead:
     """The start of a chunk record; `data_start` counts from the start of the contents."""
     cursor = _Cursor(content)
-    _, _, size, crc = cursor.take("<QQQI")
+    start_ns, end_ns, size, crc = cursor.take("<QQQI")
     compression = cursor.string()
     (data_size,) = cursor.take("<Q")
-    return ChunkHead(size, crc, compression, cursor.at, data_size)
+    return ChunkHead(start_ns, end_ns, size, crc, compression, cursor.at, data_size)
 
 
 def parse_chunk_index(content: bytes) -> ChunkIndex:
     """A chunk index record."""
     cursor = _Cursor(content)
-    _, _, start, length = cursor.take("<QQQQ")
+    start_ns, end_ns, start, length = cursor.take("<QQQQ")
     indexes = cursor.integers()
     (index_length,) = cursor.take("<Q")
-    return ChunkIndex(start, length, indexes, index_length)
+    return ChunkIndex(start_ns, end_ns, start, length, indexes, index_length, cursor.string())
 
 
 def parse_statistics(content: bytes) -> Statistics:
@@ -210,10 +226,31 @@ def parse_footer(content: bytes) -> Footer:
     return Footer(summary_start, crc)
 
 
-def parse_message_index(content: bytes) -> IntArray:
-    """Offsets of a channel's messages in its uncompressed chunk, ascending, shape (n,)."""
-    entries = np.frombuffer(_Cursor(content, 2).blob(), dtype="<u8")
-    return np.sort(entries.reshape(-1, 2)[:, 1].astype(np.int64))
+def parse_data_end(content: bytes) -> int:
+    """CRC of all bytes before the data end record; 0 where there is none."""
+    (crc,) = _Cursor(content).take("<I")
+    return crc
+
+
+def parse_message_index(content: bytes) -> tuple[int, IntArray, IntArray]:
+    """Channel, and offsets in the uncompressed chunk (ascending) and log times in ns of its messages, shape (n,).
+
+    Raises:
+        struct.error, ValueError: The contents are no such record, or name a message twice.
+    """
+    cursor = _Cursor(content)
+    (channel,) = cursor.take("<H")
+    times, offsets = np.frombuffer(cursor.blob(), dtype="<i8").reshape(-1, 2).T
+    if cursor.at < len(content):
+        raise ValueError("a message index is longer than its entries")
+    steps = np.diff(offsets)
+    if (steps < 0).any():
+        order = np.argsort(offsets, kind="stable")
+        times, offsets = times[order], offsets[order]
+        steps = np.diff(offsets)
+    if not steps.all():
+        raise ValueError("a message index names a message twice")
+    return channel, offsets, times
 
 
 @dataclass(frozen=True)
@@ -228,19 +265,19 @@ class Found:
     stop: int
 
 
-def walk(data: bytes, limit: int) -> Found:
+def walk(data: bytes | memoryview, limit: int, at: int = 0) -> Found:
     """Hop from record to record over messages, schemas and channels.
 
     Args:
-        data: Records, from the first byte on.
+        data: Records.
         limit: Bytes of `data` to walk over.
+        at: Where the first record starts.
 
     Returns:
         What was found; `stop` is smaller than `limit` if a record is cut or of another kind.
     """
     messages: dict[int, list[int]] = {}
     definitions: list[tuple[int, int, int]] = []
-    at = 0
     unpack = _MESSAGE_START.unpack_from
     last = limit - HEAD_SIZE
     while at <= last:

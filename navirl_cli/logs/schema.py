@@ -1,12 +1,15 @@
 """Message definitions as they are embedded in a log, parsed by rosbags' type system."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import json
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError, normalize_fieldname
 from rosbags.typesys.store import Typestore
@@ -33,10 +36,21 @@ PRIMITIVES: Final = {
 _SEPARATOR: Final = "=" * 80 + "\n"
 #: What rosbags' parsers and its code generator raise on text that defines no message.
 _PARSER_ERRORS: Final = (TypesysError, SyntaxError, LookupError, ValueError, TypeError, AttributeError, AssertionError)
+#: Entries of a fixed array of texts or messages (rosbags writes code for each), and of numbers.
+_MAX_WRITTEN_OUT, _MAX_ARRAY = 1000, 1 << 28
+#: What rosbags puts into a message without fields, which has this byte in CDR, and in ROS 1 none.
+_FILLER: Final = "structure_needs_at_least_one_member"
+
+#: Schema encodings that go with each message encoding; JSON messages tell their own fields.
+ENCODINGS: Final = {"cdr": ("ros2msg", "ros2idl"), "ros1": ("ros1msg",), "json": None}
 
 
 class SchemaError(Exception):
     """A definition does not parse, or a field is not in it; the message says why."""
+
+
+class DecodeError(Exception):
+    """A payload is no message of its type; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +63,8 @@ class Leaf:
     dtype: str
     #: Number of entries a message of a fixed array; None for a single value.
     count: int | None = None
+    #: The sequence that the field is in, "transforms[]", whose entries of all messages stand one after the other.
+    sequence: str | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -63,72 +79,182 @@ class Schema:
     #: Full name, "geometry_msgs/msg/WrenchStamped".
     name: str
     store: Typestore
+    #: How payloads are encoded, "cdr" or "ros1".
+    encoding: str = "cdr"
 
     def fields(self, typename: str) -> list[tuple[str, FieldDesc]]:
         """Names and types of a contained type's fields, in the order of the bytes."""
-        return self.store.fielddefs[typename][1]
+        fields = self.store.fielddefs[typename][1]
+        return fields if self.encoding == "cdr" else [one for one in fields if one[0] != _FILLER]
 
     def leaf(self, path: str) -> Leaf:
-        """The kind of a dotted field.
+        """The kind of a dotted field; "poses[].position.x" is a field of every entry of a sequence.
 
         Raises:
             SchemaError: There is no such field, or it does not become a column.
         """
         desc: FieldDesc = (Nodetype.NAME, self.name)
-        for part in path.split("."):
+        sequence = None
+        for number, part in enumerate(parts := path.split(".")):
             if desc[0] != Nodetype.NAME:
                 raise SchemaError(f"{part!r} in {path!r} lies below a field that is no single message")
+            name = part.removesuffix("[]")
             fields = dict(self.fields(desc[1]))
-            if part not in fields:
-                raise SchemaError(f"{desc[1]} has no field {part!r} of {path!r}; its fields are {', '.join(fields)}")
-            desc = fields[part]
-        return _leaf(path, desc)
+            if name not in fields:
+                known = ", ".join(fields).replace(_FILLER, "none")
+                raise SchemaError(f"{desc[1]} has no field {name!r} of {path!r}; its fields are {known}")
+            desc = fields[name]
+            if name != part:
+                if desc[0] not in {Nodetype.ARRAY, Nodetype.SEQUENCE} or sequence is not None:
+                    raise SchemaError(f"{part!r} in {path!r} is no sequence, or lies in another one")
+                desc, sequence = desc[1][0], ".".join(parts[: number + 1])
+        leaf = _leaf(path, desc)
+        if sequence is not None and leaf.count is not None:
+            raise SchemaError(f"{path!r} is an array in a sequence")
+        return Leaf(leaf.kind, leaf.dtype, leaf.count, sequence)
 
-    def deserialize(self, payload: bytes) -> object:
-        """The message object of a CDR payload (rosbags' SerdeError if it is none)."""
-        return self.store.deserialize_cdr(payload, self.name)
+    def deserialize(self, payload: bytes) -> Any:
+        """The message object of a payload.
+
+        Raises:
+            DecodeError: It is no such message.
+        """
+        decode = self.store.deserialize_ros1 if self.encoding == "ros1" else self.store.deserialize_cdr
+        try:
+            return decode(payload, self.name)
+        except SerdeError as error:
+            raise DecodeError(str(error)) from error
 
 
-def value_at(message: object, path: str) -> object:
-    """The value of a dotted field of a message object."""
+@dataclass
+class JsonSchema:
+    """JSON objects of one channel, which need no definition: a field is what it is in the first message that tells."""
+
+    name: str
+    _leaves: dict[str, Leaf] = field(default_factory=dict)
+
+    def leaf(self, path: str) -> Leaf:
+        """The kind of a field; a number where no message has told yet."""
+        sequence = path.rpartition("[]")[0]
+        return self._leaves.get(path, Leaf("number", "<f8", None, f"{sequence}[]" if sequence else None))
+
+    def learn(self, payload: bytes, paths: Iterable[str]) -> bool:
+        """Take the kinds of fields that are not known yet from a message; say whether all are known now."""
+        unknown = [path for path in paths if path not in self._leaves]
+        if unknown:
+            try:
+                message = self.deserialize(payload)
+            except DecodeError:
+                return False
+            for path in unknown:
+                leaf = _json_leaf(message, path, self.leaf(path).sequence)
+                if leaf is not None:
+                    self._leaves.setdefault(path, leaf)
+        return all(path in self._leaves for path in unknown)
+
+    def deserialize(self, payload: bytes) -> Any:
+        """The object.
+
+        Raises:
+            DecodeError: The payload is no JSON object.
+        """
+        try:
+            message = json.loads(payload)
+        except (ValueError, RecursionError) as error:
+            raise DecodeError(f"no JSON: {error}") from error
+        if not isinstance(message, dict):
+            raise DecodeError(f"expected a JSON object, found {type(message).__name__}")
+        return message
+
+
+AnySchema = Schema | JsonSchema
+
+
+def value_at(message: Any, path: str) -> Any:
+    """The value of a dotted field of a message object or JSON object; a list for a field in a sequence.
+
+    Raises:
+        DecodeError: A JSON object has no such field.
+    """
+    head, bracket, tail = path.partition("[]")
     value = message
-    for part in path.split("."):
-        value = getattr(value, normalize_fieldname(part))
-    return value
+    for part in head.split("."):
+        name = normalize_fieldname(part)
+        if isinstance(value, dict) and part in value:
+            value = value[part]
+        elif hasattr(value, "__msgtype__") and hasattr(value, name):
+            value = getattr(value, name)
+        else:
+            raise DecodeError(f"no field {part!r} of {path!r}")
+    if not bracket:
+        return value
+    if isinstance(value, str | dict) or not hasattr(value, "__len__"):
+        raise DecodeError(f"{head!r} is no sequence")
+    return [value_at(one, tail[1:]) for one in value] if tail else list(value)
 
 
-@lru_cache(maxsize=256)
-def parse_definition(name: str, encoding: str, text: str) -> Schema:
+def _json_leaf(message: Any, path: str, sequence: str | None) -> Leaf | None:
+    """What a field is by its value in a message; None where it is missing or has no entries."""
+    try:
+        value = value_at(message, path)
+    except DecodeError:
+        return None
+    if value == []:
+        return None
+    if isinstance(value, list) and sequence is None:
+        return Leaf("number", "<f8", len(value))
+    first = value if sequence is None else value[0]
+    kind, dtype = ("time", "<i8") if isinstance(first, dict) else ("number", "<f8")
+    return Leaf("string", "O", None, sequence) if isinstance(first, str) else Leaf(kind, dtype, None, sequence)
+
+
+def parse_definition(name: str, encoding: str, text: str, message_encoding: str = "cdr") -> AnySchema:
     """Parse a message definition.
 
     Args:
         name: Message type, "geometry_msgs/msg/WrenchStamped" or "geometry_msgs/WrenchStamped".
-        encoding: "ros2msg" or "ros2idl".
+        encoding: "ros2msg", "ros2idl" or "ros1msg"; any for JSON messages.
         text: The definition followed by those of the contained types, as rosbag2 embeds them.
+        message_encoding: "cdr", "ros1" or "json".
 
     Returns:
-        The type in a store of its own: two channels may define one name differently.
+        The type in a store of its own: two channels may define one name differently. The same text is parsed once.
 
     Raises:
-        SchemaError: The encoding is another one, or the text does not define the type.
+        SchemaError: The encodings are others, or the text does not define the type.
     """
-    if encoding not in {"ros2msg", "ros2idl"}:
-        raise SchemaError(f"the schema's encoding is {encoding!r}")
-    full = name if name.count("/") != 1 else name.replace("/", "/msg/")
-    text = text.replace("\r\n", "\n")
+    full = full_name(name)
+    fitting = ENCODINGS.get(message_encoding, ())
+    if fitting is None:
+        return JsonSchema(full)
+    if encoding not in fitting:
+        raise SchemaError(f"the messages' encoding is {message_encoding!r} and the schema's encoding is {encoding!r}")
+    return _parsed(full, encoding, text.replace("\r\n", "\n"), message_encoding)
+
+
+@lru_cache(maxsize=256)
+def _parsed(full: str, encoding: str, text: str, message_encoding: str) -> Schema:
+    # such a store has nothing but times, which are primitives in ROS 1
     store = get_typestore(Stores.EMPTY)
+    schema = Schema(full, store, message_encoding)
     try:
-        store.register(get_types_from_msg(text, full) if encoding == "ros2msg" else _types_from_idl(text))
-        _check_complete(store, full)
+        store.register(_types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, full))
+        _check(schema)
         store.get_msgdef(full)
-    except _PARSER_ERRORS as error:
+    except (*_PARSER_ERRORS, RecursionError) as error:
         first = (str(error).splitlines() or [""])[0][:120]
         raise SchemaError(f"its definition does not parse ({type(error).__name__}: {first})") from error
-    return Schema(full, store)
+    return schema
+
+
+def full_name(name: str) -> str:
+    """A type's name as ROS 2 writes it: ROS 1 leaves "/msg" out."""
+    return name if name.count("/") != 1 else name.replace("/", "/msg/")
 
 
 def _types_from_idl(text: str) -> Typesdict:
-    """Types of one IDL text, or of several with rosbag2's separators."""
+    """Types of one IDL text, or of several with rosbag2's separators; what they include stands behind them."""
+    text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
     if not text.startswith(_SEPARATOR):
         return get_types_from_idl(text)
     types: Typesdict = {}
@@ -137,18 +263,27 @@ def _types_from_idl(text: str) -> Typesdict:
     return types
 
 
-def _check_complete(store: Typestore, name: str) -> None:
-    """Every type that is used must be defined."""
-    missing = {used for owner in store.fielddefs for used in _uses(store, owner)} | {name}
-    if missing := missing - store.fielddefs.keys():
-        raise TypesysError(f"no definition of {', '.join(sorted(missing))}")
+def _check(schema: Schema) -> None:
+    """Every type that is used must be defined, and nothing may keep rosbags busy for ever."""
+    known = schema.store.fielddefs
+    fields = [(name, desc, _entry(desc)) for owner in known for name, desc in schema.fields(owner)]
+    used = {entry[1] for _, _, entry in fields if entry[0] == Nodetype.NAME} | {schema.name}
+    if missing := used - known.keys():
+        raise TypesysError(f"no definition of {', '.join(sorted(map(str, missing)))}")
+    for name, desc, entry in fields:
+        number = entry[0] == Nodetype.BASE and entry[1][0] != "string"
+        if number and entry[1][0] not in PRIMITIVES:
+            raise TypesysError(f"{name} is a {entry[1][0]}, which cannot be read")
+        size = desc[1][1] if desc[0] == Nodetype.ARRAY else 0
+        if not 0 <= size <= (_MAX_ARRAY if number else _MAX_WRITTEN_OUT):
+            raise TypesysError(f"{name} is an array of {size} entries")
+        if desc[0] == Nodetype.SEQUENCE and entry[0] == Nodetype.NAME and not schema.fields(entry[1]):
+            raise TypesysError(f"{name} is a sequence of messages without fields")
 
 
-def _uses(store: Typestore, owner: str) -> Iterator[str]:
-    for _, desc in store.fielddefs[owner][1]:
-        inner = desc[1][0] if desc[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else desc
-        if inner[0] == Nodetype.NAME:
-            yield str(inner[1])
+def _entry(desc: FieldDesc) -> FieldDesc:
+    """The type of a field, or of an entry of an array or sequence."""
+    return desc[1][0] if desc[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else desc
 
 
 def _leaf(path: str, desc: FieldDesc) -> Leaf:
@@ -161,4 +296,4 @@ def _leaf(path: str, desc: FieldDesc) -> Leaf:
             return Leaf("string", "O")
         if inner[1][0] in PRIMITIVES:
             return Leaf("number", PRIMITIVES[inner[1][0]], count)
-    raise SchemaError(f"{path!r} is no number, text, time or fixed array of numbers; read whole messages instead")
+    raise SchemaError(f"{path!r} is no number, text, time or fixed array of numbers")

@@ -106,4 +106,5 @@ def drive(path: Path, start_m: FloatArray, steer: Steering, speed_m_s: float = F
         forward = min(speed_m_s, 0.8 * left + 0.05)
         here = here + STEP_S * (forward * path.tangent[progress] + inward * aside + command)
         track.append(here)
-    return Drive(np.array(track), np.array(commands))
+    # a drive that does not arrive in time ends with a step that no command follows
+    return Drive(np.array(track[: len(commands)]), np.array(commands))

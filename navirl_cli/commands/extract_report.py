@@ -1,0 +1,68 @@
+"""The tables of ``navirl extract``."""
+
+from collections.abc import Sequence
+from math import degrees, hypot
+from typing import Any
+
+from navirl_cli.commands.shared import text_table
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.lines import path_length_m
+
+#: Columns of the table, and how their numbers are written.
+FORMATS = {
+    "trial": "",
+    "condition": "",
+    "cycle": "d",
+    "duration s": ".1f",
+    "length m": ".2f",
+    "cells": "d",
+    "contacts": "d",
+    "contact %": ".0f",
+    "peak N": ".1f",
+    "impulse Ns": ".1f",
+    "direction deg": ".0f",
+}
+
+
+def trial_row(d: Demonstration) -> dict[str, Any]:
+    """One trial of the table, by its columns."""
+    strongest = max(d.contacts, key=lambda contact: hypot(*contact.impulse_ns), default=None)
+    values = (
+        d.id,
+        d.condition.value,
+        d.cycle,
+        d.duration_s,
+        path_length_m(d.xy_m),
+        len(d.cells),
+        len(d.contacts),
+        100 * d.contact_s / d.duration_s,
+        max((contact.peak_n for contact in d.contacts), default=None),
+        sum(hypot(*contact.impulse_ns) for contact in d.contacts),
+        None if strongest is None else degrees(strongest.direction_rad),
+    )
+    return dict(zip(FORMATS, values, strict=True))
+
+
+def trial_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The trials, one a line."""
+    return text_table(list(FORMATS), [[_shown(name, row[name]) for name in FORMATS] for row in rows])
+
+
+def _shown(name: str, value: Any) -> str:
+    return "-" if value is None else format(value, FORMATS[name])
+
+
+#: Columns of the table of gains: field, heading and how its numbers are written.
+GAIN_FORMATS = (
+    ("m_s_per_n", "gain m/s/N", ".4g"),
+    ("standard_error", "standard error", ".2g"),
+    ("pushes", "pushes", "d"),
+    ("delay_s", "delay s", ".2f"),
+)
+
+
+def gain_table(gain: dict[str, Any]) -> str:
+    """The gain of each log, and of all together where there are several."""
+    lines = [*gain["logs"], *([{"log": "all", **gain}] if len(gain["logs"]) > 1 else [])]
+    rows = [[line["log"], *(format(line[field], style) for field, _, style in GAIN_FORMATS)] for line in lines]
+    return text_table(["log", *(heading for _, heading, _ in GAIN_FORMATS)], rows)

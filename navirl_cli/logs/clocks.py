@@ -1,0 +1,278 @@
+"""When a message was measured, on one clock for the whole recording.
+
+A header's stamp is the time of the measurement; the time of receipt stands in where there is none. The clock of a
+recording is that of its odometry's stamps. It may be simulated, may be another computer's than the recorder's, and may
+jump; where another topic's stamps go by another clock, the times of receipt tell the offset between the two.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.logs.recording import FloatArray, IntArray
+
+BoolArray = NDArray[np.bool_]
+NS_PER_S = 1_000_000_000
+#: A clock that moves by more than this against the recorder's between two messages has jumped, s.
+JUMP_S = 1.0
+#: Stamps farther from where their clock should be belong to another clock, s: no robot's messages take so long.
+APART_S = 0.25
+#: Stamps that move by more against their clock until the end, s, belong to another one too; below this, the offset
+#: between two clocks is taken to be constant.
+_DRIFT_S, _CONSTANT_S = 0.1, 0.02
+#: From so many messages on another clock's offset is known.
+_MIN_MESSAGES = 20
+#: Widths of medians over offsets, messages: against single wrong stamps, and against the time that messages take, which
+#: is also a time in s, for a recorder's disk stalls all topics at once.
+_OUTLIERS, _LATENCY, _LATENCY_S = 5, 51, 2.0
+#: A time of receipt this far from all others is wrong, s.
+_ANOTHER_DAY_S = 3600.0
+#: Stamps this early are simulated or count from the computer's start, not from 1970: ns.
+EARLIEST_NS = 365 * 86_400 * NS_PER_S
+
+
+class TimeSource(StrEnum):
+    """What the times of a recording are."""
+
+    HEADER = "header"
+    LOG = "log"
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """Times of a topic's messages, before and after correction."""
+
+    topic: str
+    #: (n,) ns of receipt, ascending.
+    log_ns: IntArray
+    #: (n,) ns, 0 where there is no stamp; None for messages without a header.
+    stamp_ns: IntArray | None
+    #: Whether a message says what is so from its receipt on, such as a goal; others may be older, such as a map that is
+    #: sent to whoever comes late.
+    momentary: bool = False
+
+
+@dataclass
+class Clock:
+    """The clock of a recording.
+
+    Args:
+        reference: Stamps of the odometry, which define it.
+        source: Whether stamps or times of receipt are wanted.
+    """
+
+    reference: Stamped
+    source: TimeSource = TimeSource.HEADER
+    #: What is odd about the stamps, in words.
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Follow the reference's offset to the recorder's clock over time."""
+        log_ns, stamp_ns = self.reference.log_ns, self.reference.stamp_ns
+        stamp_ns = np.zeros_like(log_ns) if stamp_ns is None else stamp_ns
+        stamped = np.flatnonzero(stamp_ns != 0)
+        if self.source is TimeSource.HEADER and not stamped.size:
+            self.source = TimeSource.LOG
+            if len(log_ns):
+                self.notes.append(f"no message on {self.reference.topic} has a stamp; times of receipt are used")
+        #: Offset at the first stamp, ns: what follows is relative to it, so that floats hold it.
+        self._base_ns = 0
+        self._shifts_ns = np.zeros(1, dtype=np.int64)
+        self._at_ns = log_ns[stamped[:1]] if self.source is TimeSource.HEADER else np.zeros(1, dtype=np.int64)
+        self._offset_s = np.zeros(1)
+        if self.source is TimeSource.HEADER:
+            self._follow(log_ns[stamped], stamp_ns[stamped])
+
+    @property
+    def offset_ns(self) -> int:
+        """What the clock shows beyond the recorder's at its start."""
+        return self._base_ns
+
+    @property
+    def simulated(self) -> bool:
+        """Whether stamps do not count from 1970 while times of receipt do."""
+        if self.source is TimeSource.LOG or not len(self.reference.log_ns):
+            return False
+        middle = int(self.reference.log_ns[len(self.reference.log_ns) // 2])
+        return middle > EARLIEST_NS > middle + self._base_ns
+
+    def times(self, one: Stamped) -> IntArray:
+        """Times of messages on this clock, (n,) ns; what was odd about them is noted."""
+        if self.source is TimeSource.LOG:
+            return one.log_ns.copy()
+        expected = self._expected(one.log_ns)
+        if one.stamp_ns is None:
+            return expected
+        stamped = one.stamp_ns != 0
+        if not stamped.all():
+            self._note(one, int((~stamped).sum()), "are stamped 0")
+        times = np.where(stamped, self.shifted(one.stamp_ns, one.log_ns), expected)
+        if one.topic != self.reference.topic:
+            times = times - np.where(stamped, self._apart(one, _seconds(times - expected), stamped), 0)
+        away = _seconds(times - expected)
+        wild = stamped & (np.abs(away) > JUMP_S) & ~_received_wrongly(times, one.log_ns, away)
+        if self._at_ns[0] == self._at_ns[-1]:  # a converter that gives all messages one time of receipt says nothing
+            wild[:] = False
+        if wild.any() and (one.momentary or len(times) >= _MIN_MESSAGES):
+            self._note(one, int(wild.sum()), f"have stamps more than {JUMP_S:g} s off their clock")
+            times = np.where(wild, expected, times)
+        return times
+
+    def shifted(self, stamp_ns: IntArray, log_ns: IntArray) -> IntArray:
+        """Stamps (n,) ns, moved over the clock's jumps by their times of receipt; stamps of 0 stay."""
+        if self.source is TimeSource.LOG:
+            return log_ns
+        if len(self._shifts_ns) == 1:
+            return stamp_ns
+        candidates = stamp_ns[:, None] + self._shifts_ns
+        best = np.abs(candidates - self._expected(log_ns)[:, None]).argmin(axis=1)
+        moved: IntArray = candidates[np.arange(len(stamp_ns)), best]
+        return np.where(stamp_ns == 0, 0, moved)
+
+    def _follow(self, log_ns: IntArray, stamp_ns: IntArray) -> None:
+        """Find jumps, and the offset between them."""
+        offset_ns = stamp_ns - log_ns
+        self._base_ns = int(np.sort(offset_ns[:_OUTLIERS])[len(offset_ns[:_OUTLIERS]) // 2])
+        steady, jumped = _steady(_seconds(offset_ns - self._base_ns), log_ns)
+        jumps = np.flatnonzero(np.diff(jumped))
+        self._shifts_ns = np.round(-jumped[np.r_[0, jumps + 1]] * NS_PER_S).astype(np.int64)
+        self._at_ns = log_ns
+        self._offset_s = _smooth(steady - jumped, _seconds(log_ns - log_ns[0]))
+        for row in jumps.tolist():
+            at_s = (int(log_ns[row]) - int(log_ns[0])) / NS_PER_S
+            self.notes.append(
+                f"the clock jumps by {jumped[row + 1] - jumped[row]:+.2f} s {at_s:.1f} s after the start; what follows "
+                "was moved to continue"
+            )
+
+    def _expected(self, log_ns: IntArray) -> IntArray:
+        """What the clock shows when messages are received, (n,) ns."""
+        first = int(self._at_ns[0])
+        # differences first: nanoseconds since 1970 do not fit into a float
+        at_s, known_s = _seconds(log_ns - first), _seconds(self._at_ns - first)
+        rate = (self._offset_s[-1] - self._offset_s[0]) / max(known_s[-1], JUMP_S)
+        beyond_s = at_s - np.clip(at_s, 0.0, known_s[-1])
+        offset_s = np.interp(at_s, known_s, self._offset_s) + rate * beyond_s
+        shown: IntArray = log_ns + self._base_ns + np.round(offset_s * NS_PER_S).astype(np.int64)
+        return shown
+
+    def _apart(self, one: Stamped, away_s: FloatArray, stamped: BoolArray) -> IntArray:
+        """How far another clock's stamps are from this one's, (n,) ns; 0 where it is the same clock."""
+        rows = np.flatnonzero(stamped)
+        nothing = np.zeros(len(away_s), dtype=np.int64)
+        if rows.size < _MIN_MESSAGES:
+            return nothing
+        at_s = _seconds(one.log_ns - one.log_ns[0])
+        steady, jumped = _steady(away_s[rows], one.log_ns[rows])
+        steady = jumped + _smooth(steady - jumped, at_s[rows])
+        middle, change = float(np.median(steady)), float(steady[-1] - steady[0])
+        if abs(middle) <= APART_S and abs(change) <= _DRIFT_S:
+            return nothing
+        drifts = f", changing by {change:+.2f} s until the end" if abs(change) > _DRIFT_S else ""
+        self.notes.append(
+            f"{one.topic} is stamped by another clock than {self.reference.topic}: {middle:+.3f} s by the times of "
+            f"receipt{drifts}; aligned"
+        )
+        apart = np.interp(at_s, at_s[rows], steady) if np.ptp(steady) > _CONSTANT_S else np.full(len(away_s), middle)
+        return np.round(apart * NS_PER_S).astype(np.int64)
+
+    def _note(self, one: Stamped, count: int, what: str) -> None:
+        self.notes.append(f"{count} messages on {one.topic} {what}; the time of their receipt stands in")
+
+
+def in_order(topic: str, times_ns: IntArray, notes: list[str]) -> IntArray:
+    """Rows in order of time, of equal times the first; what was out of order or twice is noted.
+
+    Args:
+        topic: Its name, for notes.
+        times_ns: (n,) ns in order of receipt.
+        notes: Where notes go.
+    """
+    _, rows = np.unique(times_ns, return_index=True)
+    late = int((np.diff(times_ns) < 0).sum())
+    twice = len(times_ns) - len(rows)
+    if late:
+        notes.append(f"{late} messages on {topic} were received out of order; sorted by time")
+    if twice:
+        notes.append(f"{twice} messages on {topic} repeat the time of another; the first counts")
+    return rows
+
+
+def _seconds(ns: IntArray) -> FloatArray:
+    return ns.astype(np.float64) / NS_PER_S
+
+
+def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) -> BoolArray:
+    """Say which times are far from their receipt by the recorder's fault.
+
+    Args:
+        times_ns: (n,) ns on the recording's clock.
+        log_ns: (n,) ns of receipt, ascending.
+        away_s: (n,) s by which times are off what the clock showed at their receipt.
+
+    Returns:
+        (n,) True where a time is too old, but in order among those that are not, since the recorder stood still; and
+        where it lies among them, but its receipt on another day.
+    """
+    near = np.flatnonzero(np.abs(away_s) <= JUMP_S)
+    if not near.size:
+        return np.zeros(len(times_ns), dtype=np.bool_)
+    following = np.searchsorted(near, np.arange(len(times_ns)))
+    late: BoolArray = (following > 0) & (following < near.size) & (away_s < 0)
+    earlier, later = (times_ns[near[np.clip(following + step, 0, near.size - 1)]] for step in (-1, 0))
+    slack_ns = round(APART_S * NS_PER_S)
+    late &= (earlier - slack_ns <= times_ns) & (times_ns <= later + slack_ns)
+    elsewhere = np.maximum(_seconds(log_ns[near[0]] - log_ns), _seconds(log_ns - log_ns[near[-1]])) > _ANOTHER_DAY_S
+    inside = (times_ns >= times_ns[near].min()) & (times_ns <= times_ns[near].max())
+    wrongly: BoolArray = late | (elsewhere & inside)
+    return wrongly
+
+
+def _steady(offset_s: FloatArray, log_ns: IntArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) s, the offset of a clock without single wrong values; and (n,) s, how far it has jumped until then."""
+    steady = _running_median(offset_s)
+    steps = np.diff(steady, prepend=steady[:1])
+    # what is more than the time between two messages is no slow simulation
+    jumps = np.abs(steps) > JUMP_S + _seconds(np.diff(log_ns, prepend=log_ns[:1]))
+    return steady, np.cumsum(np.where(jumps, steps, 0.0))
+
+
+def _running_median(values: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
+    """(n,) medians over five neighbours, against single wrong values.
+
+    Args:
+        values: (n,) in order.
+        ends: How the row goes on beyond its ends: mirrored, so that a wrong value at an end is no majority, or turned
+            about, so that a rise goes on.
+    """
+    if len(values) < _OUTLIERS:
+        return values.copy()
+    padded = np.pad(values, _OUTLIERS // 2, mode="reflect", reflect_type=ends)
+    steady: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, _OUTLIERS), axis=1)
+    return steady
+
+
+def _smooth(values: FloatArray, at_s: FloatArray) -> FloatArray:
+    """(n,) medians over blocks, interpolated between their middles, against the time that messages take.
+
+    Args:
+        values: (n,) s.
+        at_s: (n,) s, ascending: times of receipt.
+    """
+    count = max(1, min(-(-len(values) // _LATENCY), int((at_s[-1] - at_s[0]) / _LATENCY_S)))
+    blocks = zip(np.array_split(at_s, count), np.array_split(values, count), strict=True)
+    # in time, not in rows: across a silence the clock goes on
+    middles, medians = np.array([(np.median(at), np.median(block)) for at, block in blocks]).T
+    middles, first = np.unique(middles, return_index=True)
+    medians = _running_median(medians[first], "odd")
+    if len(middles) > 1:  # the ends go on as their neighbours do
+        apart = np.diff(middles)[[0, -1]]
+        beyond = np.clip(at_s[[0, -1]] - middles[[0, -1]], -apart, apart)
+        ends = medians[[0, -1]] + np.diff(medians)[[0, -1]] / apart * beyond
+        outer = middles[[0, -1]] + beyond
+        middles, medians = np.r_[outer[0], middles, outer[1]], np.r_[ends[0], medians, ends[1]]
+    smooth: FloatArray = np.interp(at_s, middles, medians)
+    return smooth

@@ -1,0 +1,197 @@
+"""What is in a recording, told in a moment: from indexes, and from the first messages where only they tell."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.logs.clocks import APART_S, NS_PER_S, Clock, Stamped
+from navirl_cli.logs.container import LogFile, threads_here
+from navirl_cli.logs.parts import Batch, Damage
+from navirl_cli.logs.reader import Contents, Progress, message_times
+from navirl_cli.logs.recording import IntArray
+from navirl_cli.logs.sample import first_messages
+from navirl_cli.logs.sources import Source
+from navirl_cli.logs.topics import Choice, Topic, choices, is_missed, topics_of
+from navirl_cli.logs.whole import Opened, open_log
+
+#: A topic that comes at least this often is silent where it pauses this many times longer than usual, and this long.
+_REGULAR_S, _PAUSE, _SILENT_S = 1.0, 5.0, 0.5
+#: Roles whose stamps can be the recording's clock, the best first.
+_CLOCKS = ("odometry", "wrench", "tf")
+
+
+@dataclass(frozen=True)
+class Flow:
+    """How the messages of a topic come in."""
+
+    topic: Topic
+    #: "cdr", "ros1", "json" or what the recorder says.
+    encoding: str
+    #: First and last time of receipt, ns; None without messages.
+    start_ns: int | None
+    end_ns: int | None
+    #: Messages a second on average, silences apart; None for less than three.
+    rate_hz: float | None
+    #: Silences of a regular topic: how many, the longest in s, and when that begins, s since the log's first message.
+    gaps: int
+    longest_s: float
+    longest_at_s: float
+    #: Stamps less times of receipt, s, by the first messages; None without stamps.
+    offset_s: float | None
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What is in a recording."""
+
+    source: Source
+    contents: tuple[Contents, ...]
+    start_ns: int | None
+    end_ns: int | None
+    flows: tuple[Flow, ...]
+    choices: dict[str, Choice]
+    #: What is lost, and what is odd about clocks, in words.
+    damage: tuple[str, ...]
+    clocks: tuple[str, ...]
+    #: How the frames of the first transforms connect; empty without tf.
+    frames: str
+
+    @property
+    def reference_s(self) -> float:
+        """Stamps less times of receipt of the topic whose clock counts, s; 0 where none is known."""
+        names = [topic.name for role in _CLOCKS for topic in self.choices[role].topics]
+        offsets = [flow.offset_s for name in names for flow in self.flows if flow.topic.name == name]
+        return next((offset for offset in offsets if offset is not None), 0.0)
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """What extract cannot do without and the log does not hold."""
+        return tuple(role for role, choice in self.choices.items() if is_missed(choice, self.choices))
+
+
+def overview(
+    source: Source, chosen: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
+) -> Overview:
+    """Look over a recording.
+
+    Args:
+        source: Its files.
+        chosen: Topics by role where the user says so.
+        check: Read every message, so that damage inside of chunks shows too.
+        progress: Called with bytes done and bytes in all.
+
+    Raises:
+        LogError: A file is no MCAP file, or a chosen topic does not fit.
+    """
+    with ExitStack() as stack:
+        files = [stack.enter_context(open_log(path)) for path in source.files]
+        return _looked_over(source, files, chosen, progress, check=check)
+
+
+def _looked_over(
+    source: Source,
+    files: Sequence[Opened],
+    chosen: Mapping[str, Sequence[str]],
+    progress: Progress | None,
+    *,
+    check: bool,
+) -> Overview:
+    """The overview of files that are open."""
+    looked = [message_times(file) for file in files]
+    contents = tuple(one for one, _ in looked)
+    topics = topics_of(contents)
+    times: dict[str, list[IntArray]] = {}
+    for one, by_channel in looked:
+        for channel in one.channels:
+            times.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+    starts = [one.start_ns for one in contents if one.start_ns is not None]
+    ends = [one.end_ns for one in contents if one.end_ns is not None]
+    start = min(starts, default=None)
+    sample = first_messages(files)
+    encodings = {channel.topic: channel.message_encoding for one in contents for channel in one.channels}
+    flows = tuple(
+        _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start or 0, sample.stamped.get(name))
+        for name, topic in topics.items()
+    )
+    picked = choices(source.name, topics, chosen)
+    inside = _checked(files, progress) if check else [note for one in contents for note in one.damage]
+    return Overview(
+        source,
+        contents,
+        start,
+        max(ends, default=None),
+        flows,
+        picked,
+        tuple(map(str, (*source.damage, *inside))),
+        tuple(_clocks(picked, sample.stamped)),
+        sample.frames,
+    )
+
+
+def _flow(topic: Topic, encoding: str, t_ns: IntArray, start_ns: int, stamped: Stamped | None) -> Flow:
+    """How one topic's messages come in."""
+    gaps = np.diff(t_ns) / NS_PER_S
+    usual = float(np.median(gaps)) if len(gaps) > 1 else np.inf
+    pauses = np.flatnonzero(gaps > max(_PAUSE * usual, _SILENT_S)) if usual < _REGULAR_S else np.zeros(0, dtype=int)
+    spoken = np.delete(gaps, pauses)
+    longest = int(pauses[gaps[pauses].argmax()]) if len(pauses) else None
+    offset = None if stamped is None or stamped.stamp_ns is None else (stamped.stamp_ns - stamped.log_ns)
+    some = None if offset is None or stamped is None else offset[stamped.stamp_ns != 0]
+    return Flow(
+        topic,
+        encoding,
+        int(t_ns[0]) if len(t_ns) else None,
+        int(t_ns[-1]) if len(t_ns) else None,
+        len(spoken) / float(spoken.sum()) if len(spoken) > 1 and spoken.any() else None,
+        len(pauses),
+        0.0 if longest is None else float(gaps[longest]),
+        0.0 if longest is None else (int(t_ns[longest]) - start_ns) / NS_PER_S,
+        None if some is None or not len(some) else float(np.median(some) / NS_PER_S),
+    )
+
+
+def _checked(files: Sequence[Opened], progress: Progress | None) -> list[Damage]:
+    """Damage that shows when every message is read."""
+    total = sum(file.size for file in files)
+    notes: list[Damage] = []
+    done = 0
+    for path in files:
+        with LogFile(path) as log:
+            for _ in log.results(lambda _: True, _count, threads_here()):
+                if progress is not None:
+                    progress(done + log.position, total)
+            notes += log.damage
+        done += path.size
+    return notes
+
+
+def _count(batch: Batch) -> int:
+    return len(batch.starts)
+
+
+def _clocks(picked: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
+    """What is odd about the clocks of the topics that an extraction would take."""
+    names = {role: [topic.name for topic in choice.topics] for role, choice in picked.items() if choice.topics}
+    reference = next((name for role in _CLOCKS for name in names.get(role, ())), "")
+    if reference not in stamped:
+        return []
+    clock = Clock(stamped[reference])
+    said = []
+    began_s = (int(stamped[reference].log_ns[0]) + clock.offset_ns) / NS_PER_S
+    if clock.simulated:
+        said.append(
+            f"header stamps are simulated time, or time since the computer's start: {reference} begins at "
+            f"{began_s:.2f} s"
+        )
+    elif abs(clock.offset_ns) > APART_S * NS_PER_S:
+        differ = clock.offset_ns / NS_PER_S
+        said.append(f"header stamps of {reference} differ by {differ:+.3f} s from the recorder's clock")
+    if said:
+        said[0] += "; extract goes by the stamps, unless --time log"
+    for role in ("wrench", "people"):
+        for name in names.get(role, ()):
+            if name in stamped and name != reference:
+                clock.times(stamped[name])
+    return [*said, *(f"in the first messages: {note}" for note in clock.notes)]

@@ -1,0 +1,318 @@
+"""What a user's arguments mean: files, bag folders, folders of recordings and patterns become recordings to read."""
+
+import glob
+import os
+import re
+import stat
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+from navirl_cli.errors import LogError
+from navirl_cli.logs.parts import Damage
+from navirl_cli.logs.sniff import CONVERT, check_path
+from navirl_cli.logs.yaml_file import brief, read_mapping
+
+_METADATA: Final = "metadata.yaml"
+_INFO: Final = "rosbag2_bagfile_information"
+#: A recording's file name; the group leaves out a compression of the whole.
+_MCAP: Final = re.compile(r"(.*\.mcap)(?:\.(?:zstd|zst|lz4))?", re.IGNORECASE | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Source:
+    """One recording: the file that holds it, or the files in order."""
+
+    #: File name, or the bag folder's name.
+    name: str
+    files: tuple[Path, ...]
+    #: Files that should be there and are not.
+    damage: tuple[Damage, ...] = ()
+    #: What is odd about the files, in words.
+    notes: tuple[str, ...] = ()
+
+
+def sources_of(
+    arguments: Sequence[Path | str], *, join: bool = False, refused: list[LogError] | None = None
+) -> list[Source]:
+    """Turn a command's arguments into recordings.
+
+    A file is a recording, whatever its name. A rosbag2 folder is one, with its files in the order that metadata.yaml
+    gives or, where the recorder was killed before it wrote that, in the order of their numbers. In any other folder and
+    below it, every .mcap file and every bag is a recording. A pattern with * ** ? or [ stands for what it matches.
+
+    Args:
+        arguments: Paths or patterns.
+        join: Take all files as one recording, under the name of the first.
+        refused: Takes up what is wrong with arguments, and with bags in folders, where others are good; raised if None.
+
+    Returns:
+        The recordings in the order of the arguments, those of a folder or pattern by name (10 behind 9). No file is in
+        two of them.
+
+    Raises:
+        LogError: An argument is not there, holds no recording, or is a bag that navirl cannot read.
+    """
+    trouble: list[LogError] = []
+    sources = _once([source for argument in arguments for source in _tried(_meant, argument, trouble)])
+    if trouble and (refused is None or not sources):
+        raise trouble[0]
+    if refused is not None:
+        refused += trouble
+    if not join or not sources:
+        return [_hinted(source) for source in sources]
+    whole = sources[0]
+    for part in sources[1:]:
+        whole = Source(whole.name, whole.files + part.files, whole.damage + part.damage, whole.notes + part.notes)
+    return [whole]
+
+
+def _tried(
+    find: Callable[[Any, list[LogError]], list[Source]], argument: Path | str, trouble: list[LogError]
+) -> list[Source]:
+    """What is found, or nothing and why."""
+    try:
+        return find(argument, trouble)
+    except LogError as error:
+        trouble.append(error)
+        return []
+
+
+def _meant(argument: Path | str, trouble: list[LogError]) -> list[Source]:
+    """The recordings that one argument stands for."""
+    path, text = Path(argument), os.fspath(argument)
+    if _is_folder(path):
+        found = _recordings(path, set(), trouble)
+        if not found and not trouble:
+            raise LogError(f"{path}: expected .mcap files in this folder or below it, found {_instead(path)}")
+        return found
+    if not _mode(path) and any(sign in text for sign in "*?["):
+        return _matched(text, trouble)
+    check_path(path)
+    return [Source(path.name, (path,))]
+
+
+def _instead(folder: Path) -> str:
+    """What a folder without recordings holds, and the remedy."""
+    entries = _listing(folder)
+    for entry in entries:
+        if entry.suffix == ".bag":
+            return f"{entry.name}; convert it: {CONVERT.format(path=entry, stem=entry.stem)}"
+        if entry.suffix == ".db3":
+            made = CONVERT.format(path=folder, stem=folder.resolve().name)
+            return f"{entry.name}; make metadata.yaml of it by `ros2 bag reindex`, then convert the folder: {made}"
+    return f"{_some(entries) or 'an empty one'}; give the folder that holds the recordings"
+
+
+def _matched(pattern: str, trouble: list[LogError]) -> list[Source]:
+    """The recordings that a pattern stands for."""
+    matches = sorted({Path(match) for match in glob.iglob(pattern, recursive=True)}, key=_natural)  # noqa: PTH207
+    folders = {match for match in matches if _is_folder(match)}
+    # what stands in a folder that matches is found with the folder
+    matches = [match for match in matches if not folders.intersection(match.parents)]
+    others = [match for match in matches if match not in folders and not _MCAP.fullmatch(match.name)]
+    seen: set[Path] = set()
+    found: list[Source] = []
+    for match in matches:
+        if match in folders:
+            found += _recordings(match, seen, trouble)
+        elif match not in others:
+            found.append(Source(match.name, (match,)))
+    if found and others:
+        note = f"{pattern}: {len(others)} other files match and are left out: {_some(others)}"
+        found[0] = replace(found[0], notes=(*found[0].notes, note))
+    # where no name is that of an MCAP file others were meant: reading says what they are
+    found = found or [Source(file.name, (file,)) for file in others]
+    if not found and not trouble:
+        what = f"folders without any ({_some(matches)})" if matches else "nothing"
+        raise LogError(f"{pattern}: expected a pattern that matches recordings, found that it matches {what}; check it")
+    return found
+
+
+def _recordings(folder: Path, seen: set[Path], trouble: list[LogError]) -> list[Source]:
+    """The recordings in a folder and below it, possibly none; `seen` are folders that need no second look."""
+    here = folder.resolve()
+    if here in seen:
+        return []
+    seen.add(here)
+    entries = _listing(folder)
+    files = [entry for entry in entries if _MCAP.fullmatch(entry.name) and not _is_folder(entry)]
+    bag = _described(folder, here.name, files) if folder / _METADATA in entries else Source(here.name, ())
+    if bag.files:
+        return [bag]
+    found = _loose(folder, here.name, files)
+    for entry in entries:
+        if _is_folder(entry):
+            found += _tried(lambda below, trouble: _recordings(below, seen, trouble), entry, trouble)
+    if found:
+        found[0] = replace(found[0], damage=bag.damage + found[0].damage, notes=bag.notes + found[0].notes)
+    elif bag.damage:
+        missing = _some([damage.path for damage in bag.damage])
+        raise LogError(
+            f"{folder}: expected the files that metadata.yaml lists ({missing}), found none of them; copy them into it"
+        )
+    return found
+
+
+def _described(folder: Path, name: str, files: Sequence[Path]) -> Source:
+    """The recording that metadata.yaml describes; without files if it cannot be used or lists none that is there."""
+    try:
+        listed, info = _listed(folder / _METADATA)
+    except LogError as error:
+        return Source(name, (), (), (str(error),))
+    _refuse_foreign(folder, listed, info)
+    damage, notes, there = [], [], []
+    for wanted in listed:
+        file = _same(folder / wanted, files)
+        if file is None:
+            damage.append(Damage(folder / wanted, 0, 0, "listed in metadata.yaml, but missing; its messages are lost"))
+        else:
+            there.append(file)
+            if file.name != wanted:
+                notes.append(f"{name}: metadata.yaml lists {wanted}; {file.name} is read for it")
+    if left := [file.name for file in files if file not in there]:
+        notes.append(f"{name}: metadata.yaml does not list {', '.join(left)}; left out")
+    return Source(name, tuple(there), tuple(damage), tuple(notes) if there else ())
+
+
+def _listed(path: Path) -> tuple[list[str], Mapping[Any, Any]]:
+    """The names of a bag's files by its metadata.yaml, and what else that says of the bag."""
+    remedy = "the folder's files are taken without it"
+    info = read_mapping(path, remedy).get(_INFO)
+    if not isinstance(info, dict):
+        raise LogError(f"{path}: key {_INFO}: expected keys and values, found {brief(info)}; {remedy}")
+    listed = info.get("relative_file_paths")
+    if not listed and isinstance(info.get("files"), list):
+        listed = [entry.get("path") if isinstance(entry, dict) else None for entry in info["files"]]
+    if not isinstance(listed, list) or not listed or not all(isinstance(name, str) and name for name in listed):
+        raise LogError(f"{path}: key relative_file_paths: expected names of files, found {brief(listed)}; {remedy}")
+    # old recorders put the folder's name before that of the file
+    return [PurePosixPath(name).name for name in listed], info
+
+
+def _refuse_foreign(folder: Path, listed: Iterable[str], info: Mapping[Any, Any]) -> None:
+    """Refuse a bag whose files or messages navirl cannot read."""
+    if info.get("storage_identifier") == "sqlite3" or any(".db3" in PurePosixPath(name).suffixes for name in listed):
+        found = "a ROS 2 bag in SQLite"
+    elif str(info.get("compression_mode")).lower() == "message":
+        found = "one whose messages are compressed one by one (compression_mode: MESSAGE)"
+    else:
+        return
+    made = CONVERT.format(path=folder, stem=folder.resolve().name)
+    raise LogError(f"{folder}: expected a bag in MCAP, found {found}; convert it: {made}")
+
+
+def _same(wanted: Path, files: Sequence[Path]) -> Path | None:
+    """A file by its name, else the same one compressed or decompressed as a whole."""
+    if stat.S_ISREG(_mode(wanted)):
+        return wanted
+    return next((file for file in files if _plain(file) == _plain(wanted)), None)
+
+
+def _loose(folder: Path, name: str, files: Sequence[Path]) -> list[Source]:
+    """The recordings among files that no metadata.yaml describes: pieces named like the folder are one of them."""
+    chosen: dict[str, Path] = {}
+    # a file as it is stands before its compressed forms
+    for file in files:
+        chosen.setdefault(_plain(file), file)
+    pieces = _pieces(name, chosen.values())
+    found = [Source(name, tuple(pieces.values()), tuple(_holes(folder, name, pieces)))] if pieces else []
+    alone = set(chosen.values()).difference(pieces.values())
+    found += [Source(file.name, (file,)) for file in files if file in alone]
+    if left := [file.name for file in files if file not in chosen.values()]:
+        note = f"{name}: left out as other forms of files that are there: {', '.join(left)}"
+        found[0] = replace(found[0], notes=(note,))
+    return found
+
+
+def _pieces(name: str, files: Iterable[Path]) -> dict[int, Path]:
+    """Those files that rosbag2 would write into a folder of this name, by their numbers in order."""
+    pattern = re.compile(re.escape(name) + r"_(0|[1-9][0-9]*)\.mcap", re.IGNORECASE)
+    found = {int(match[1]): file for file in files if (match := pattern.fullmatch(_plain(file)))}
+    # a date is no number of a piece
+    limit = max(1000, 2 * len(found))
+    return {number: found[number] for number in sorted(found) if number < limit}
+
+
+def _holes(folder: Path, name: str, numbers: Iterable[int]) -> Iterator[Damage]:
+    """The pieces missing before and between those that are there; rosbag2 counts from 0."""
+    following = 0
+    for number in numbers:
+        if number > following:
+            upto = f" and those up to {name}_{number - 1}.mcap" if number - following > 1 else ""
+            reason = f"no such file, though later pieces of the recording are there; its messages{upto} are lost"
+            yield Damage(folder / f"{name}_{following}.mcap", 0, 0, reason)
+        following = number + 1
+
+
+def _once(sources: Sequence[Source]) -> list[Source]:
+    """Leave out files that are there already, also by a link; of two recordings that of more files keeps them."""
+    owners: dict[tuple[int, int], int] = {}
+    files: defaultdict[int, list[Path]] = defaultdict(list)
+    notes: defaultdict[int, list[str]] = defaultdict(list)
+    for number in sorted(range(len(sources)), key=lambda number: -len(sources[number].files)):
+        for file in sources[number].files:
+            check_path(file)
+            key = (file.stat().st_dev, file.stat().st_ino)
+            if key in owners:
+                notes[owners[key]].append(f"{file} is given more than once; read once")
+            else:
+                owners[key] = number
+                files[number].append(file)
+    return [
+        replace(sources[number], files=tuple(files[number]), notes=(*sources[number].notes, *notes[number]))
+        for number in sorted(files)
+    ]
+
+
+def _hinted(source: Source) -> Source:
+    """Say of a file that is given alone when it is a piece of a longer recording."""
+    file = source.files[0]
+    folder = file.absolute().parent
+    if source.name != file.name or not _pieces(folder.name, [file]):
+        return source
+    pieces = _pieces(folder.name, folder.glob(f"{glob.escape(folder.name)}_*"))
+    if len(pieces) < 2:
+        return source
+    note = f"{file.name} is one of {len(pieces)} pieces of a recording; give the folder {folder} to read them as one"
+    return replace(source, notes=(*source.notes, note))
+
+
+def _plain(file: Path) -> str:
+    """A file's name without the compression of the whole."""
+    match = _MCAP.fullmatch(file.name)
+    return match[1] if match else file.name
+
+
+def _natural(path: Path) -> tuple[list[str | int], str]:
+    """Sorts piece 10 behind piece 9."""
+    parts = re.split(r"([0-9]+)", str(path).casefold())
+    return [int(part) if number % 2 else part for number, part in enumerate(parts)], str(path)
+
+
+def _some(paths: Sequence[Path]) -> str:
+    """Up to three names."""
+    return ", ".join([path.name for path in paths[:3]] + ["..."] * (len(paths) > 3))
+
+
+def _listing(folder: Path) -> list[Path]:
+    """What a folder holds, by name; hidden files apart."""
+    try:
+        entries = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
+    except OSError as error:
+        raise LogError(f"{folder}: expected a readable folder, found: {error.strerror}; check its rights") from error
+    return sorted(entries, key=_natural)
+
+
+def _is_folder(path: Path) -> bool:
+    return stat.S_ISDIR(_mode(path))
+
+
+def _mode(path: Path) -> int:
+    """What the system says a path is, 0 where nothing is found."""
+    try:
+        return path.stat().st_mode
+    except OSError:
+        return 0

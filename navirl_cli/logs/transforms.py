@@ -1,0 +1,299 @@
+"""Transforms at given times, and the links between two frames that they are made of.
+
+Between two stamps the translation is interpolated linearly and the rotation by spherical linear interpolation
+(Shoemake 1985, Animating rotation with quaternion curves, SIGGRAPH), as tf2 does.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from navirl_cli.errors import FrameError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+#: First and last time, ns.
+Span = tuple[int, int]
+
+#: Before and after all stamps, ns.
+ALWAYS: Final[Span] = (int(np.iinfo(np.int64).min), int(np.iinfo(np.int64).max))
+#: Lengths of quaternions that are taken: digits may have been rounded away, but a damaged one has no direction.
+_LENGTHS: Final = (0.9, 1.1)
+#: No frame's origin is further away, in m; a damaged number may be.
+_FARTHEST_M: Final = 1e9
+
+_STAMP: Final = "transforms[].header.stamp"
+_PAIR: Final = ("transforms[].header.frame_id", "transforms[].child_frame_id")
+_POSE: Final = (
+    *(f"transforms[].transform.translation.{axis}" for axis in "xyz"),
+    *(f"transforms[].transform.rotation.{axis}" for axis in "xyzw"),
+)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Poses of a child frame in its parent frame."""
+
+    parent: str
+    child: str
+    #: Stamps in ns, shape (k,), any order; a fixed link needs one row, whose stamp does not matter.
+    t_ns: IntArray
+    #: Origin of the child in the parent, m, shape (k, 3).
+    translation_m: FloatArray
+    #: Rotation of the child in the parent as x, y, z, w, shape (k, 4).
+    quaternion: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check shapes."""
+        k = len(self.t_ns)
+        shapes = (np.shape(self.t_ns), np.shape(self.translation_m), np.shape(self.quaternion))
+        if shapes != ((k,), (k, 3), (k, 4)) or k == 0:
+            raise FrameError(
+                f"transform {self.parent} -> {self.child}: expected stamps (k,), translations (k, 3) and quaternions "
+                f"(k, 4) with k > 0, found shapes {shapes}"
+            )
+
+
+@dataclass(frozen=True)
+class Transforms:
+    """Transforms of points from a source frame into a target frame, one for each time."""
+
+    #: n rotations.
+    rotation: Rotation
+    #: Origin of the source frame in the target frame, m, shape (n, 3).
+    translation_m: FloatArray
+
+    @property
+    def yaw_rad(self) -> FloatArray:
+        """Heading of the source frame's x axis in the target frame's x-y plane, in (-pi, pi], shape (n,)."""
+        axis = self.rotation.apply((1.0, 0.0, 0.0))
+        yaw: FloatArray = np.arctan2(axis[:, 1], axis[:, 0])
+        return yaw
+
+    def apply(self, points_m: ArrayLike) -> FloatArray:
+        """Points of the source frame in the target frame.
+
+        Args:
+            points_m: Shape (n, 3), or (3,) for the same point at each time; m.
+
+        Returns:
+            Shape (n, 3), m.
+        """
+        rotated: FloatArray = self.rotation.apply(np.asarray(points_m, dtype=np.float64))
+        return rotated + self.translation_m
+
+    def inverse(self) -> "Transforms":
+        """The transforms from the target frame into the source frame."""
+        back = self.rotation.inv()
+        return Transforms(back, -back.apply(self.translation_m))
+
+    def after(self, first: "Transforms") -> "Transforms":
+        """The transforms that apply `first` and then these."""
+        return Transforms(self.rotation * first.rotation, self.apply(first.translation_m))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The sound poses of a child frame in its parent, in order of time."""
+
+    parent: str
+    child: str
+    #: Stamps in ns, strictly increasing, shape (k,); k is 1 where the link is fixed.
+    t_ns: IntArray
+    #: Shape (k, 3), m.
+    translation_m: FloatArray
+    #: k rotations.
+    rotation: Rotation
+    #: Rotation vectors from each rotation to the next, in the child's axes; the last is zero; shape (k, 3).
+    turn_rad: FloatArray
+    fixed: bool
+
+    @classmethod
+    def of(cls, links: Sequence[Link], parent: str, child: str, *, fixed: bool, zeros: bool) -> tuple[Self | None, int]:
+        """Join links into a curve; of equal stamps, and of fixed poses, the last counts.
+
+        Args:
+            links: At least one.
+            parent: Name of the parent frame.
+            child: Name of the child frame.
+            fixed: Whether stamps do not matter.
+            zeros: Whether a stamp of 0 is sound.
+
+        Returns:
+            The curve, None if no pose is sound; and how many are not.
+        """
+        t_ns = np.concatenate([np.asarray(link.t_ns, dtype=np.int64) for link in links])
+        translation = np.concatenate([np.asarray(link.translation_m, dtype=np.float64) for link in links])
+        quaternion = np.concatenate([np.asarray(link.quaternion, dtype=np.float64) for link in links])
+        good = _sound(translation, quaternion) & (zeros | (t_ns != 0))
+        good &= parent not in ("", child) and child != ""
+        rows = np.flatnonzero(good)
+        if not rows.size:
+            return None, len(good)
+        rows = rows[-1:] if fixed else rows[np.argsort(t_ns[rows], kind="stable")]
+        rows = rows[np.append(np.diff(t_ns[rows]) > 0, True)]
+        rotation = Rotation.from_quat(quaternion[rows])
+        turn = np.append((rotation[:-1].inv() * rotation[1:]).as_rotvec(), np.zeros((1, 3)), axis=0)
+        return cls(parent, child, t_ns[rows], translation[rows], rotation, turn, fixed), int((~good).sum())
+
+    @property
+    def span(self) -> Span:
+        """First and last stamp in ns; ALWAYS for a fixed link."""
+        return ALWAYS if self.fixed else (int(self.t_ns[0]), int(self.t_ns[-1]))
+
+    def at(self, times: IntArray, until: IntArray) -> Transforms:
+        """The child's poses in the parent, held beyond the stamps.
+
+        Args:
+            times: Shape (n,), ns.
+            until: When another parent takes over, shape (n,), ns: a stamp beyond is not interpolated to.
+        """
+        rows = self._rows(times)
+        after = np.minimum(rows + 1, len(self.t_ns) - 1)
+        # differences first: nanoseconds since 1970 do not fit into a float
+        step = np.maximum(self.t_ns[after] - self.t_ns[rows], 1)
+        share = np.where(self.t_ns[after] <= until, np.clip((times - self.t_ns[rows]) / step, 0.0, 1.0), 0.0)[:, None]
+        translation = (1.0 - share) * self.translation_m[rows] + share * self.translation_m[after]
+        return Transforms(self.rotation[rows] * Rotation.from_rotvec(share * self.turn_rad[rows]), translation)
+
+    def gaps(self, times: IntArray, until: IntArray) -> IntArray:
+        """Distance in ns between the stamps around each time, or to the only one; 0 on a stamp; shape (n,)."""
+        if self.fixed:
+            return np.zeros(len(times), dtype=np.int64)
+        rows = self._rows(times)
+        begin, end = self.t_ns[rows], np.minimum(np.append(self.t_ns[1:], ALWAYS[1])[rows], until)
+        held = (times < begin) | (end == ALWAYS[1])
+        return np.where(held | (times == begin), np.abs(times - begin), np.where(held, begin, end) - begin)
+
+    def _rows(self, times: IntArray) -> IntArray:
+        """The last stamp at or before each time, or the first."""
+        return np.maximum(np.searchsorted(self.t_ns, times, side="right") - 1, 0)
+
+
+#: Curves from a frame up, each with when another parent takes over, shape (m,), ns.
+Steps = list[tuple[Curve, IntArray]]
+
+
+@dataclass(frozen=True)
+class Way:
+    """How two frames connect at some of the times of a lookup."""
+
+    #: Which times, shape (m,).
+    rows: IntArray
+    #: From the source frame up to where the two meet.
+    up: Steps
+    #: The same from the target frame.
+    down: Steps
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """All curves."""
+        return tuple(curve for curve, _ in (*self.up, *self.down))
+
+    @property
+    def span(self) -> Span:
+        """First and last time in ns that all curves cover; ALWAYS if all are fixed."""
+        spans = [ALWAYS, *(curve.span for curve in self.curves)]
+        return max(first for first, _ in spans), min(last for _, last in spans)
+
+    def at(self, times: IntArray) -> Transforms:
+        """The transforms from source to target at the way's times, shape (m,)."""
+        into, back = (_chain(steps, times) for steps in (self.up, self.down))
+        return back.inverse().after(into) if self.down else into
+
+    def gaps(self, times: IntArray) -> IntArray:
+        """The largest of the curves' gaps, shape (m,), ns."""
+        gaps = [curve.gaps(times, until) for curve, until in (*self.up, *self.down)]
+        largest: IntArray = np.max([np.zeros(len(times), dtype=np.int64), *gaps], axis=0)
+        return largest
+
+
+def in_force(curves: Sequence[Curve], covers: Mapping[str, Span], times: IntArray) -> tuple[IntArray, IntArray]:
+    """Which of a child's curves is in force at each time, and when another one takes over.
+
+    Args:
+        curves: To different parents, p of them.
+        covers: From when to when a parent's own transforms have stamps, ns: others do not count, if any do.
+        times: Shape (n,), ns.
+
+    Returns:
+        Numbers below p, shape (n,), and times in ns, shape (n,).
+    """
+    if len(curves) == 1:
+        return np.zeros(len(times), dtype=np.int64), np.full(len(times), ALWAYS[1])
+    spans = [covers.get(curve.parent, ALWAYS) for curve in curves]
+    kept = [curve.t_ns[~beyond(curve.t_ns, span)] for curve, span in zip(curves, spans, strict=True)]
+    stamps = kept if any(t.size for t in kept) else [curve.t_ns for curve in curves]
+    padded = [np.concatenate([ALWAYS[:1], t, ALWAYS[1:]]) for t in stamps]
+    places = [np.searchsorted(t, times, side="right") for t in stamps]
+    latest = np.stack([t[place] for t, place in zip(padded, places, strict=True)])
+    following = np.stack([t[place + 1] for t, place in zip(padded, places, strict=True)])
+    chosen = np.where((latest == ALWAYS[0]).all(axis=0), following.argmin(axis=0), latest.argmax(axis=0))
+    others = np.where(np.arange(len(curves))[:, None] == chosen, ALWAYS[1], following)
+    return chosen, others.min(axis=0)
+
+
+def links_of(columns: Mapping[str, NDArray[Any]], counts: IntArray, t_ns: IntArray | None = None) -> list[Link]:
+    """A link for each pair of frames in the columns of TFMessages.
+
+    Args:
+        columns: By field, such as `transforms[].transform.rotation.w`: the entries of all messages in order, shape
+            (total,); translations in m, stamps as int64 ns, names as str objects.
+        counts: How many entries each message has, shape (n,).
+        t_ns: Stamps in ns in place of the column's, shape (total,).
+
+    Returns:
+        Links in order of their last entries, so that of several fixed ones the last stays the last.
+
+    Raises:
+        FrameError: A field is missing or has another number of entries than the messages.
+    """
+    columns = dict(columns) if t_ns is None else {**columns, _STAMP: t_ns}
+    total = int(np.sum(counts))
+    for name in (_STAMP, *_PAIR, *_POSE):
+        if name not in columns:
+            raise FrameError(
+                f"transforms: expected the field {name}, found {', '.join(columns) or 'no fields'}; "
+                "record tf2_msgs/msg/TFMessage, or leave the topic out"
+            )
+        if (found := len(columns[name])) != total:
+            raise FrameError(f"transforms: expected {total} entries in the field {name}, found {found}")
+    if total == 0:
+        return []
+    pairs: dict[tuple[str, str], int] = {}
+    entries = zip(*(columns[name].tolist() for name in _PAIR), strict=True)
+    group = np.fromiter((pairs.setdefault(pair, len(pairs)) for pair in entries), np.int64, total)
+    order = np.argsort(group, kind="stable")
+    members = np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
+    poses = np.stack([np.asarray(columns[name], dtype=np.float64) for name in _POSE], axis=1)
+    return [
+        Link(parent, child, columns[_STAMP][rows], poses[rows, :3], poses[rows, 3:])
+        for (parent, child), rows in sorted(zip(pairs, members, strict=True), key=lambda item: int(item[1][-1]))
+    ]
+
+
+def beyond(times: IntArray, span: Span, hold_ns: int = 0) -> BoolArray:
+    """Which times lie further outside of a span than `hold_ns`, shape (n,)."""
+    return (times < span[0] - hold_ns) | (times > span[1] + hold_ns)
+
+
+def _sound(translation: FloatArray, quaternion: FloatArray) -> BoolArray:
+    """Which poses hold numbers that can be meant, shape (k,)."""
+    near = (np.abs(translation) < _FARTHEST_M).all(axis=1)
+    # clipped, since the square of a damaged number may be too large for a float
+    length = np.linalg.norm(np.clip(quaternion, -2.0, 2.0), axis=1)
+    sound: BoolArray = near & (length > _LENGTHS[0]) & (length < _LENGTHS[1])
+    return sound
+
+
+def _chain(steps: Steps, times: IntArray) -> Transforms:
+    """The transforms up a chain of curves."""
+    poses = Transforms(Rotation.from_quat(np.tile((0.0, 0.0, 0.0, 1.0), (len(times), 1))), np.zeros((len(times), 3)))
+    for curve, until in steps:
+        poses = curve.at(times, until).after(poses)
+    return poses

@@ -1,0 +1,51 @@
+"""YAML files that other programs write."""
+
+from pathlib import Path
+from typing import Any
+
+from navirl_cli.errors import LogError
+
+
+def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
+    """Read a YAML file whose top level is keys and values.
+
+    Args:
+        path: The file.
+        remedy: What to do when it is none, for the message.
+
+    Returns:
+        Plain dicts, lists, texts and numbers.
+
+    Raises:
+        LogError: The file cannot be read, does not parse or holds something else.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    expected = f"{path}: expected YAML with keys and values, found"
+    try:
+        document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise LogError(f"{path}: expected a YAML file, found: {error.strerror}; {remedy}") from error
+    # beside its own errors ruamel lets pass those of int(), datetime() and deep nesting
+    except (YAMLError, ValueError, LookupError, RecursionError) as error:
+        raise LogError(f"{expected} {_problem(error)}; {remedy}") from error
+    if document is None:
+        raise LogError(f"{expected} nothing; {remedy}")
+    if not isinstance(document, dict):
+        raise LogError(f"{expected} {brief(document)}; {remedy}")
+    return document
+
+
+def brief(value: object) -> str:
+    """A value as a message shows it: on one line, and not longer than a line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _problem(error: Exception) -> str:
+    """What a parser complains about, on one line, with the line of the file where it says so."""
+    mark = getattr(error, "problem_mark", None)
+    where = f"line {mark.line + 1}: " if mark is not None else ""
+    words = str(getattr(error, "problem", None) or error)
+    return f"{where}{' '.join(words.split())[:100]}"

@@ -1,0 +1,283 @@
+"""A slow and strict twin of the reader: it takes a file as the specification words it, or says what is wrong with it.
+
+Source: https://mcap.dev/spec. Nothing here goes on behind a fault, and nothing is taken from indexes: messages are
+those that a walk over the data section meets.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import lz4.frame
+import zstandard
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX = range(1, 8)
+ATTACHMENT, STATISTICS, METADATA, DATA_END, PRIVATE = 0x09, 0x0B, 0x0C, 0x0F, 0x80
+IN_SUMMARY = frozenset({SCHEMA, CHANNEL, 0x08, 0x0A, STATISTICS, 0x0D, 0x0E})
+
+
+class FaultError(Exception):
+    """The bytes are no MCAP by the specification; the message says why."""
+
+
+class Record(NamedTuple):
+    """Bytes [start, stop) of what it stands in, its head of nine bytes included."""
+
+    code: int
+    start: int
+    stop: int
+
+    @property
+    def inside(self) -> slice:
+        return slice(self.start + 9, self.stop)
+
+
+class Told(NamedTuple):
+    """A message where it stands."""
+
+    channel: int
+    log_time_ns: int
+    #: The chunk's uncompressed bytes, or the file, and where it stands in them.
+    raw: bytes
+    place: Record
+    chunk: Record | None
+
+    @property
+    def whole(self) -> bytes:
+        """The record with its head."""
+        return self.raw[self.place.start : self.place.stop]
+
+    @property
+    def payload(self) -> bytes:
+        return self.raw[self.place.start + 31 : self.place.stop]
+
+
+@dataclass
+class Strict:
+    """What is in a file."""
+
+    #: Of the data section, then of the summary section.
+    records: list[Record] = field(default_factory=list)
+    #: Name, encoding and text by id; schema, topic and encoding of the messages by id.
+    schemas: dict[int, tuple[str, str, bytes]] = field(default_factory=dict)
+    channels: dict[int, tuple[int, str, str]] = field(default_factory=dict)
+    messages: list[Told] = field(default_factory=list)
+    #: Messages by channel id as the summary's statistics promise them, and as the message indexes do.
+    promised: dict[int, int] = field(default_factory=dict)
+    indexed: dict[int, int] = field(default_factory=dict)
+
+    def chunks(self) -> list[Record]:
+        return [record for record in self.records if record.code == CHUNK]
+
+    def of(self, *topics: str) -> list[Told]:
+        ids = {number for number, (_, topic, _) in self.channels.items() if topic in topics}
+        return [told for told in self.messages if told.channel in ids]
+
+
+def records_in(data: bytes, at: int, stop: int) -> Iterator[Record]:
+    """Hop from record to record, up to `stop` exactly."""
+    while at < stop:
+        if at + 9 > stop:
+            raise FaultError(f"half a record's head at {at}")
+        code, length = struct.unpack_from("<BQ", data, at)
+        if at + 9 + length > stop:
+            raise FaultError(f"record {code:#x} at {at} is longer than there is room")
+        yield Record(code, at, at + 9 + length)
+        at += 9 + length
+
+
+def walk(data: bytes) -> Strict:
+    """Everything in a file.
+
+    Raises:
+        FaultError: Its data section, its end or a CRC in it breaks the specification.
+    """
+    found = Strict()
+    try:
+        _walk(data, found)
+    except (struct.error, ValueError) as error:
+        raise FaultError(str(error)) from error
+    return found
+
+
+def chunk_head(data: bytes) -> tuple[int, int, str, int, int]:
+    """Uncompressed size, CRC, compression, and first byte and number of the compressed bytes, of a chunk's contents."""
+    size, crc = struct.unpack_from("<QI", data, 16)
+    compression, at = _text(data, 28)
+    (count,) = struct.unpack_from("<Q", data, at)
+    return size, crc, compression, at + 8, count
+
+
+def uncompressed(data: bytes) -> bytes:
+    """The records of a chunk by its contents.
+
+    Raises:
+        FaultError: They do not decompress, or size or CRC are others.
+    """
+    size, crc, compression, at, count = chunk_head(data)
+    if at + count > len(data):
+        raise FaultError("a chunk is longer than its record")
+    packed = data[at : at + count]
+    try:
+        if compression == "zstd":
+            raw = zstandard.ZstdDecompressor().decompressobj().decompress(packed) if size else b""
+        elif compression == "lz4":
+            raw = lz4.frame.decompress(packed)
+        elif compression:
+            raise FaultError(f"compression {compression!r}")
+        else:
+            raw = packed
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
+        raise FaultError(f"a chunk does not decompress: {error}") from error
+    if len(raw) != size or (crc and zlib.crc32(raw) != crc):
+        raise FaultError("a chunk has another size or CRC")
+    return raw
+
+
+def unpacked(data: bytes) -> bytes:
+    """The MCAP bytes of a file that may be compressed as a whole.
+
+    Raises:
+        FaultError: It does not decompress.
+    """
+    found = b""
+    try:
+        while data.startswith((b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18")):
+            stream = (
+                zstandard.ZstdDecompressor().decompressobj() if data[0] == 0x28 else lz4.frame.LZ4FrameDecompressor()
+            )
+            found += stream.decompress(data)
+            if not stream.eof:
+                raise FaultError("the compression is cut")
+            data = stream.unused_data or b""
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
+        raise FaultError(f"the compression is damaged: {error}") from error
+    if found and data:
+        raise FaultError("something stands behind what is compressed")
+    return found or data
+
+
+def metadata(data: bytes) -> tuple[str, dict[str, str]]:
+    """Name and entries of a metadata record by its contents."""
+    name, at = _text(data, 0)
+    (size,) = struct.unpack_from("<I", data, at)
+    at, stop = at + 4, at + 4 + size
+    if stop > len(data):
+        raise FaultError("metadata longer than its record")
+    texts = []
+    while at < stop:
+        text, at = _text(data, at)
+        texts.append(text)
+    return name, dict(zip(texts[::2], texts[1::2], strict=True))
+
+
+def _walk(data: bytes, found: Strict) -> None:
+    if not data.startswith(MAGIC) or not data.endswith(MAGIC) or len(data) < 60:
+        raise FaultError("no magic")
+    tail = Record(FOOTER, len(data) - 37, len(data) - 8)
+    if struct.unpack_from("<BQ", data, tail.start) != (FOOTER, 20):
+        raise FaultError("no footer")
+    summary_start, _, summary_crc = struct.unpack_from("<QQI", data, tail.start + 9)
+    end = summary_start or tail.start
+    if not 8 < end <= tail.start:
+        raise FaultError("the summary starts outside of the file")
+    found.records = list(records_in(data, 8, end))
+    if found.records[0].code != HEADER or found.records[-1].code != DATA_END:
+        raise FaultError("the data section lacks its header or its end")
+    _, at = _text(content := data[found.records[0].inside], 0)
+    _text(content, at)
+    for record in found.records[1:-1]:
+        _take(data, record, found)
+    (crc,) = struct.unpack_from("<I", data[found.records[-1].inside])
+    if crc and crc != zlib.crc32(data[: found.records[-1].start]):
+        raise FaultError("the CRC of the data is wrong")
+    for number in {told.channel for told in found.messages}:
+        if number not in found.channels or found.channels[number][0] not in {0, *found.schemas}:
+            raise FaultError(f"channel {number} or its schema is not defined")
+    if summary_start and not (summary_crc and zlib.crc32(data[summary_start : tail.start + 25]) != summary_crc):
+        _take_summary(data, summary_start, tail.start, found)
+
+
+def _take(data: bytes, record: Record, found: Strict) -> None:
+    """A record of the data section."""
+    content = data[record.inside]
+    if record.code == CHUNK:
+        raw = uncompressed(content)
+        for inner in records_in(raw, 0, len(raw)):
+            if inner.code not in {SCHEMA, CHANNEL, MESSAGE} and inner.code < PRIVATE:
+                raise FaultError(f"record {inner.code:#x} in a chunk")
+            _take_one(raw, inner, found, record)
+    elif record.code == INDEX:
+        channel, size = struct.unpack_from("<HI", content)
+        if size % 16 or 6 + size > len(content):
+            raise FaultError("a message index of another size")
+        found.indexed[channel] = found.indexed.get(channel, 0) + size // 16
+    elif record.code == METADATA:
+        metadata(content)
+    elif record.code in {SCHEMA, CHANNEL, MESSAGE}:
+        _take_one(data, record, found, None)
+    elif record.code != ATTACHMENT and record.code < PRIVATE:
+        raise FaultError(f"record {record.code:#x} in the data section")
+
+
+def _take_one(data: bytes, record: Record, found: Strict, chunk: Record | None) -> None:
+    """A schema, channel or message."""
+    if record.code == MESSAGE:
+        if record.stop - record.start < 31:
+            raise FaultError("a message shorter than its head")
+        channel, _, log_time_ns = struct.unpack_from("<HIQ", data, record.start + 9)
+        found.messages.append(Told(channel, _signed(log_time_ns), data, record, chunk))
+    elif record.code in {SCHEMA, CHANNEL}:
+        _define(record.code, data[record.inside], found.schemas, found.channels)
+
+
+def _define(
+    code: int, content: bytes, schemas: dict[int, tuple[str, str, bytes]], channels: dict[int, tuple[int, str, str]]
+) -> None:
+    """A schema or channel, which nothing may define in two ways."""
+    if code == SCHEMA:
+        (number,) = struct.unpack_from("<H", content)
+        name, at = _text(content, 2)
+        encoding, at = _text(content, at)
+        (size,) = struct.unpack_from("<I", content, at)
+        if at + 4 + size > len(content):
+            raise FaultError("a definition longer than its record")
+        schema = name, encoding, content[at + 4 : at + 4 + size]
+        if schemas.setdefault(number, schema) != schema:
+            raise FaultError(f"schema {number} is defined in two ways")
+    else:
+        number, schema_id = struct.unpack_from("<HH", content)
+        topic, at = _text(content, 4)
+        encoding, _ = _text(content, at)
+        channel = schema_id, topic, encoding
+        if channels.setdefault(number, channel) != channel:
+            raise FaultError(f"channel {number} is defined in two ways")
+
+
+def _take_summary(data: bytes, start: int, stop: int, found: Strict) -> None:
+    """What the summary says, up to its first fault."""
+    try:
+        records = list(records_in(data, start, stop))
+        for record in records:
+            content = data[record.inside]
+            if record.code == STATISTICS:
+                (size,) = struct.unpack_from("<I", content, 42)
+                found.promised = dict(struct.iter_unpack("<HQ", content[46 : 46 + size]))
+    except (FaultError, struct.error, ValueError):
+        found.promised = {}
+        return
+    found.records += records
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    (size,) = struct.unpack_from("<I", data, at)
+    if at + 4 + size > len(data):
+        raise FaultError("a text longer than its record")
+    return data[at + 4 : at + 4 + size].decode(), at + 4 + size
+
+
+def _signed(value: int) -> int:
+    return value - (1 << 64) if value >> 63 else value

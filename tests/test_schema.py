@@ -1,0 +1,200 @@
+"""Definitions that no parser should swallow, and JSON, which has none."""
+
+import json
+import re
+
+import log_factory as forge
+import numpy as np
+import pytest
+
+from navirl_cli.logs.reader import read
+from navirl_cli.logs.schema import JsonSchema, SchemaError, parse_definition
+
+#: Chunks of a message each.
+TINY = {"chunk_size": 1}
+
+
+def test_names_and_texts_as_recorders_write_them():
+    assert parse_definition("a_msgs/A", "ros2msg", "float64 x # metres\r\n\r\nint32 y\r\n").name == "a_msgs/msg/A"
+    assert parse_definition("a_msgs/A", "ros1msg", "time t\nduration[2] d\n", "ros1").leaf("d[]").kind == "time"
+    full = "a_msgs/B b\n" + "=" * 80 + "\nMSG: a_msgs/msg/B\nstring<=9[<=3] words\nfloat32[4] q 1.0\nuint8 ANY=3\n"
+    assert parse_definition("a_msgs/msg/A", "ros2msg", full).leaf("b.q").count == 4
+
+
+@pytest.mark.parametrize(
+    ("encoding", "text", "message"),
+    [
+        ("jsonschema", "{}", "the messages' encoding is 'cdr' and the schema's encoding is 'jsonschema'"),
+        ("ros2idl", "module a {", "its definition does not parse"),
+        ("ros2msg", "a_msgs/A same\n", "its definition does not parse (RecursionError: "),
+        ("ros2msg", "a_msgs/A[] children\n", "its definition does not parse (RecursionError: "),
+        ("ros2msg", "float64[-3] x\n", "(TypesysError: x is an array of -3 entries)"),
+        ("ros2msg", "float64[99999999999999999999] x\n", "(TypesysError: x is an array of 99999999999999999999 entr"),
+        ("ros2msg", "string[1000000000] names\n", "(TypesysError: names is an array of 1000000000 entries)"),
+        ("ros2msg", "builtin_interfaces/Time[1001] t\n", "(TypesysError: t is an array of 1001 entries)"),
+        ("ros2msg", "wstring name\n", "(TypesysError: no definition of a_msgs/msg/wstring)"),
+        ("ros2msg", "float64 class\nfloat64 class_\n", "has conflicting Python names: 'class' and 'class_'"),
+        (
+            "ros2msg",
+            "int8 x\n" + "=" * 80 + "\nMSG: builtin_interfaces/Time\nuint32 sec\n",
+            "Type 'builtin_interfaces/msg/Time' is already present with different definition.",
+        ),
+        (
+            "ros2idl",
+            "module a_msgs { module msg { struct A { double x; long double y; }; }; };",
+            "(TypesysError: y is a float128, which cannot be read)",
+        ),
+        (
+            "ros2idl",
+            "module a_msgs { module msg { struct A { wstring y; }; }; };",
+            "(TypesysError: y is a wstring, which cannot be read)",
+        ),
+    ],
+)
+def test_definitions_that_cannot_be_used_are_named(encoding, text, message):
+    with pytest.raises(SchemaError) as caught:
+        parse_definition("a_msgs/msg/A", encoding, text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_messages_without_fields():
+    """They have one byte in CDR and none in ROS 1, of which a broken length could promise thousands of millions."""
+    text = "a_msgs/E[] all\n" + "=" * 80 + "\nMSG: a_msgs/E\n"
+    assert parse_definition("a_msgs/msg/A", "ros2msg", text).deserialize(b"\0\1\0\0\2\0\0\0\0\0").all is not None
+    with pytest.raises(SchemaError, match="all is a sequence of messages without fields"):
+        parse_definition("a_msgs/msg/A", "ros1msg", text, "ros1")
+    one = parse_definition("a_msgs/msg/A", "ros1msg", text.replace("[]", "") + "\n", "ros1")
+    assert one.deserialize(b"").__msgtype__ == "a_msgs/msg/A"
+
+
+def read_json(tmp_path, messages, *fields, name="x/J", **options):
+    """Read topic /j, whose messages are given as objects or as text."""
+    log = [
+        forge.Message("/j", name, k, one.encode() if isinstance(one, str) else json.dumps(one).encode())
+        for k, one in enumerate(messages)
+    ]
+    definitions = {name: ("jsonschema", "{}") if name else ("", "")}
+    path = forge.forge(tmp_path / "j.mcap", log, definitions=definitions, encodings={"/j": "json"}, **options)
+    # with more threads the first to learn is not always that of the first chunk
+    result = read(path, {"/j": fields}, threads=1)
+    return result.series["/j"], [note.reason for note in result.damage]
+
+
+@pytest.mark.parametrize(
+    "spelling",
+    [
+        {"sec": 1_700_000_000, "nanosec": 123_456_789},
+        {"sec": 1_700_000_000, "nsec": 123_456_789},
+        {"secs": 1_700_000_000, "nsecs": 123_456_789},
+        {"sec": "1700000000", "nanosec": "123456789"},
+        {"sec": 1_700_000_000.0, "nanosec": 123_456_789.0},
+    ],
+)
+@pytest.mark.parametrize("name", ["x/J", ""])
+def test_spellings_of_times(tmp_path, spelling, name):
+    messages = [{"header": {"stamp": spelling}, "all": [{"t": spelling}] * k} for k in range(3)]
+    series, notes = read_json(tmp_path, messages, "header.stamp", "all[].t", name=name)
+    assert notes == []
+    assert series.columns["header.stamp"].tolist() == [1_700_000_000_123_456_789] * 3
+    assert series.columns["all[].t"].tolist() == [1_700_000_000_123_456_789] * 3
+    assert series.columns["all[].t"].dtype == np.int64
+    assert series.counts["all[]"].tolist() == [0, 1, 2]
+
+
+def test_numbers(tmp_path):
+    """A number is a double, whether the first is written as one or not; null is what JSON has for NaN."""
+    messages = [{"x": 3, "y": [1, 2]}, {"x": 0.25, "y": [None, 1e300]}, {"x": None, "y": [True, -0.0]}]
+    series, notes = read_json(tmp_path, messages, "x", "y", "y[]")
+    assert notes == []
+    assert np.array_equal(series.columns["x"], [3.0, 0.25, np.nan], equal_nan=True)
+    assert np.array_equal(series.columns["y"], [[1.0, 2.0], [np.nan, 1e300], [1.0, 0.0]], equal_nan=True)
+    assert np.array_equal(series.columns["y[]"], series.columns["y"].ravel(), equal_nan=True)
+    assert {column.dtype for column in series.columns.values()} == {np.dtype(np.float64)}
+
+
+GOOD = {"t": {"sec": 1, "nanosec": 2}, "x": 1.5, "s": "a", "three": [1, 2, 3], "all": [{"n": "b"}]}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "trouble"),
+    [
+        ({"x": "1.5"}, "expected a number, found '1.5'"),
+        ({"x": {"v": 1}}, "expected a number, found {'v': 1}"),
+        ({"x": [1.5]}, r"expected a number, found \[1.5\]"),
+        ({"x": 10**400}, "int too large to convert to float"),
+        ({"s": 3}, "expected a text, found int"),
+        ({"s": None}, "expected a text, found NoneType"),
+        ({"t": {"seconds": 1}}, "expected a time with sec and nanosec, found keys seconds"),
+        ({"t": {"sec": 1.5, "nanosec": 0}}, "expected whole seconds and nanoseconds, found 1.5"),
+        ({"t": {"sec": "now", "nanosec": 0}}, "invalid literal for int"),
+        ({"t": {"sec": 10**30, "nanosec": 0}}, "int too large to convert to C long"),
+        ({"t": 3}, "expected a time, found int"),
+        ({"t": None}, "expected a time, found NoneType"),
+        ({"three": [1, 2]}, r"expected 3 numbers, found \[1, 2\]"),
+        ({"three": 7}, "expected 3 numbers, found 7"),
+        ({"three": [1, 2, "3"]}, "expected a number, found '3'"),
+        ({"three": [1, 2, [3]]}, r"expected a number, found \[3\]"),
+        ({"all": "b"}, "'all' is no sequence"),
+        ({"all": {"n": "b"}}, "'all' is no sequence"),
+        ({"all": [{"n": "b"}, None]}, r"no field 'n' of 'n'"),
+        ({"all": [{"n": "b"}, {"n": 3}]}, "expected a text, found int"),
+        ("{", "no JSON: Expecting property name"),
+        ("[1]", "expected a JSON object, found list"),
+        ("[" * 100_000, "no JSON: maximum recursion depth"),
+        ("{}", "no field 't' of 't'"),
+    ],
+)
+def test_a_message_that_is_not_like_the_others_is_lost_and_counted(tmp_path, wrong, trouble):
+    odd = wrong if isinstance(wrong, str) else GOOD | wrong
+    series, (note,) = read_json(tmp_path, [GOOD, odd, GOOD], "t", "x", "s", "three", "all[].n")
+    assert series.log_time_ns.tolist() == [0, 2]
+    assert series.columns["t"].tolist() == [1_000_000_002] * 2
+    assert series.columns["three"].tolist() == [[1.0, 2.0, 3.0]] * 2
+    assert series.columns["all[].n"].tolist() == ["b"] * 2
+    assert re.match(rf"1 of 3 messages of /j do not decode as x/J and are lost \(.*{trouble}", note), note
+
+
+@pytest.mark.parametrize("path", ["values", "x.count", "y.real", "s.upper", "z.append"])
+def test_what_pythons_objects_have_is_no_field(tmp_path, path):
+    series, (note,) = read_json(tmp_path, [{"x": [1], "y": 2, "s": "a", "z": []}], path)
+    assert len(series) == 0
+    assert f"all 1 messages of /j do not decode as x/J and are lost (no field '{path.split('.')[-1]}' of" in note
+
+
+def test_what_tells_nothing_is_not_learnt_from(tmp_path):
+    """Empty lists and messages without the field come first; what a field is the first that has one tells."""
+    first = [{"names": [], "three": [], "all": []}, {"pad": "x"}, "no JSON"]
+    then = {"names": ["a", "b"], "three": [1, 2, 3], "all": [{"t": {"sec": 1, "nsec": 0}}]}
+    series, (note,) = read_json(tmp_path, [*first, then, then], "names[]", "three", "all[].t")
+    assert series.columns["names[]"].tolist() == ["a", "b"] * 2
+    assert series.columns["three"].tolist() == [[1.0, 2.0, 3.0]] * 2
+    assert series.columns["all[].t"].tolist() == [10**9] * 2
+    # a fixed array cannot be empty: the first message is lost too
+    assert note.startswith("3 of 5 messages of /j")
+
+
+def test_times_are_exact_although_the_first_chunk_tells_nothing(tmp_path):
+    then = {"t": {"sec": 1_700_000_000, "nanosec": 123_456_789}}
+    series, _ = read_json(tmp_path, [{}, *[then] * 9], "t", **TINY)
+    assert series.columns["t"].tolist() == [1_700_000_000_123_456_789] * 9
+
+
+def test_arrays_although_the_first_chunk_tells_nothing(tmp_path):
+    series, _ = read_json(tmp_path, [{}, *[{"q": [1, 2, 3]}] * 9], "q", **TINY)
+    assert series.columns["q"].shape == (9, 3)
+
+
+def test_channels_do_not_learn_from_each_other(tmp_path):
+    assert parse_definition("", "", "", "json") is not parse_definition("", "", "", "json")
+    for value, expected in ((1.5, [1.5]), ("text", ["text"])):
+        series, notes = read_json(tmp_path, [{"x": value}], "x", name="")
+        assert (series.columns["x"].tolist(), notes) == (expected, [])
+
+
+def test_what_is_learnt_stays():
+    schema = JsonSchema("x/J")
+    assert schema.leaf("x").kind == "number"
+    assert not schema.learn(b'{"y": 1}', ("x", "y"))
+    assert schema.learn(b'{"x": "a", "y": "b"}', ("x", "y"))
+    assert (schema.leaf("x").kind, schema.leaf("y").kind) == ("string", "number")
