@@ -35,6 +35,19 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def make_folder(path: Path) -> Path:
+    """Make a folder where it is missing, with those above it.
+
+    Raises:
+        ArtefactError: It cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ArtefactError(f"{path}: cannot be made a folder: {error.strerror}; choose another with -o") from error
+    return path
+
+
 def check_writable(path: Path, *, force: bool) -> None:
     """Refuse early what could not be written at the end of a long computation.
 

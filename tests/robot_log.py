@@ -62,6 +62,8 @@ class Run:
     moves: bool = True
     joystick: str = ""
     session: dict[str, str] | None = None
+    #: JSON of the cells that were published with the log.
+    published: str = ""
 
 
 def write_run(path: Path, run: Run = Run()) -> Path:
@@ -85,6 +87,8 @@ def write_run(path: Path, run: Run = Run()) -> Path:
             _joystick(log, run)
         if run.session is not None:
             log.metadata("navirl.session", run.session)
+        if run.published:
+            log.metadata("navirl.published", {"cells": run.published})
     return path
 
 

@@ -22,7 +22,6 @@ def recording(tracks, messages_s=None):
     times = np.unique(np.concatenate([np.zeros(0), *(track[:, 0] for track in rows.values())]))
     return Recording(
         log="run.mcap",
-        participant=None,
         t_ns=np.array(TRIAL),
         xy_m=np.zeros((2, 2)),
         yaw_rad=np.zeros(2),

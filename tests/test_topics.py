@@ -236,7 +236,8 @@ def test_a_topic_without_messages_is_told(pick, tmp_path):
     topics = topics_of([scan(tmp_path / "run.mcap")])
     assert str(refusal("run.mcap", topics, found["wrench"])) == (
         "run.mcap: no wrench: expected a topic of type geometry_msgs/WrenchStamped or geometry_msgs/Wrench; record the "
-        "force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster; the log holds "
+        "force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster, or extract with "
+        "--no-wrench; the log holds "
         "/a_pose (geometry_msgs/PoseStamped), /map (nav_msgs/OccupancyGrid), /scan (sensor_msgs/LaserScan)"
     )
     empty = nav.Log().write(tmp_path / "run.mcap")

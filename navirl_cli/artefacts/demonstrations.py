@@ -84,7 +84,9 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
         "yaw_rad": _rounded(d.yaw_rad),
         "force_x_n": None if d.force_n is None else _rounded(d.force_n[:, 0]),
         "force_y_n": None if d.force_n is None else _rounded(d.force_n[:, 1]),
-        "contacts": [
+        "contacts": None
+        if d.contacts is None
+        else [
             {
                 "start_s": round(contact.start_s, DECIMALS),
                 "end_s": round(contact.end_s, DECIMALS),
@@ -93,6 +95,9 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
             }
             for contact in d.contacts
         ],
+        "set": d.set,
+        "nominal_m": None if d.nominal_m is None else [_rounded(corner) for corner in d.nominal_m],
+        "laid_out_m_s": d.laid_out_m_s,
         "goal_m": _rounded(np.array(d.goal_m)),
         "people_m": [_rounded(person) for person in d.people_m],
         "tracks": [_track_written(track) for track in d.tracks],
@@ -143,10 +148,7 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             xy_m=np.stack([np.array(x, dtype=float), np.array(y, dtype=float)], axis=1),
             yaw_rad=np.array(content["yaw_rad"], dtype=float),
             force_n=None if forceless else np.stack([np.array(force_x, float), np.array(force_y, float)], axis=1),
-            contacts=tuple(
-                Contact(c["start_s"], c["end_s"], c["peak_n"], (c["impulse_ns"][0], c["impulse_ns"][1]))
-                for c in content["contacts"]
-            ),
+            contacts=None if content["contacts"] is None else tuple(_contact(one) for one in content["contacts"]),
             goal_m=(content["goal_m"][0], content["goal_m"][1]),
             people_m=np.array(content["people_m"], dtype=float).reshape(-1, 2),
             robot_radius_m=content["robot_radius_m"],
@@ -154,10 +156,19 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             cells=np.array(content["cells"], dtype=np.int64),
             log=content["log"],
             tracks=tuple(_track(track) for track in content.get("tracks", ())),
+            set=content.get("set"),
+            nominal_m=None if content.get("nominal_m") is None else np.array(content["nominal_m"], dtype=float),
+            laid_out_m_s=content.get("laid_out_m_s"),
             notes=tuple(content["notes"]),
         )
     except (ValueError, TypeError, OverflowError) as error:
         raise ValueError(f"demonstration {name}: {error}") from error
+
+
+def _contact(content: Mapping[str, Any]) -> Contact:
+    """One contact of a demonstration."""
+    x, y = content["impulse_ns"]
+    return Contact(content["start_s"], content["end_s"], content["peak_n"], (x, y))
 
 
 def _track(content: Mapping[str, Any]) -> PersonTrack:

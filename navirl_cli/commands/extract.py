@@ -1,9 +1,7 @@
 """``navirl extract``: logs to demonstrations."""
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,34 +9,30 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document
 from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.extract_report import gain_table, trial_row, trial_table
+from navirl_cli.commands.extract_report import gain_table, published_notes, trial_row, trial_table
+from navirl_cli.commands.extraction import all_extracted
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
     Point,
-    bytes_bar,
     echo_json,
     finish,
     force_option,
     json_option,
+    merged,
     output_option,
     say,
     topic_option,
     topics_by_role,
 )
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
-from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
-from navirl_cli.demos.extract import extract as extract_one
+from navirl_cli.demos.extract import ExtractSettings, numbered
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split
-from navirl_cli.errors import DemonstrationError, LogError, NavirlError
 from navirl_cli.files import check_writable
 from navirl_cli.logs.clocks import TimeSource
-from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
-from navirl_cli.logs.reader import Progress
-from navirl_cli.logs.sources import Source, sources_of
-from navirl_cli.parallel import map_in_order
 
 
 @click.command()
@@ -52,7 +46,9 @@ from navirl_cli.parallel import map_in_order
     help="Trials start at new goals, at rests, or the log is one trial.",
 )
 @click.option("--participant", help="Name in place of the log's or the file's.")
-@click.option("--robot-radius", default=0.3, show_default=True, type=Number(0, 10), help="m; grows the map.")
+@click.option(
+    "--robot-radius", type=Number(0, 10), help="m; grows the map.  [default: the log's session record's, else 0.3]"
+)
 @click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m.")
 @click.option(
     "--rasterizer",
@@ -89,6 +85,7 @@ from navirl_cli.parallel import map_in_order
     "--map", "map_file", type=FilePath, help="Map in place of the log's: a Nav2 map YAML beside its pgm or png."
 )
 @click.option("--frame", help="Frame that everything is brought into, in place of the map's.")
+@click.option("--no-wrench", is_flag=True, help="Leave forces out, or do without them: contact is then unknown.")
 @click.option("--wrench-frame", help="Frame that the wrench is given in, in place of its header's.")
 @click.option(
     "--time",
@@ -107,7 +104,7 @@ def extract(
     output: Path,
     split: str,
     participant: str | None,
-    robot_radius: float,
+    robot_radius: float | None,
     resolution: float,
     rasterizer: str,
     people: tuple[tuple[float, float], ...],
@@ -118,6 +115,7 @@ def extract(
     topics: tuple[tuple[str, str], ...],
     map_file: Path | None,
     frame: str | None,
+    no_wrench: bool,
     wrench_frame: str | None,
     time_source: str,
     join: bool,
@@ -137,6 +135,8 @@ def extract(
     A force does not depend on where the sensor sits; the torque does, by the lever arm, and is not used. A push on the
     robot's body that does not pass through the sensor is not seen.
     """
+    if no_wrench and (gain or wrench_frame):
+        raise click.UsageError("--no-wrench leaves nothing to --gain and --wrench-frame.")
     check_writable(output, force=force)
     settings = ExtractSettings(
         split=Split(split),
@@ -155,9 +155,10 @@ def extract(
         frame=frame,
         wrench_frame=wrench_frame,
         occupancy=None if map_file is None else read_map(map_file),
+        forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,
     )
-    good, failed = _all_extracted(logs, settings, options, join=join)
+    good, failed = all_extracted(logs, settings, options, join=join)
     results = [result for _, result in good]
     demonstrations = numbered(results)
     inputs = [file for files, _ in good for file in files] + ([] if map_file is None else [Input.of(map_file)])
@@ -165,18 +166,21 @@ def extract(
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in results])
     write_json(output, "demonstrations", document, force=force)
-    rows = [trial_row(demonstration) for demonstration in demonstrations]
+    _echo([trial_row(demonstration) for demonstration in demonstrations], document, as_json=as_json)
+    notes = [note for result in results for note in result.notes] + published_notes(results)
+    for line in merged([*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]):
+        say(line)
+    finish([*failed, *(line for result in results for line in (*result.damage, *result.skipped))])
+
+
+def _echo(rows: Sequence[dict[str, Any]], document: Mapping[str, Any], *, as_json: bool) -> None:
+    """The trials, and the gain where it was asked for."""
     if as_json:
-        echo_json({"trials": rows, "gain": document["gain"]} if gain else rows)
+        echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
     else:
         click.echo(trial_table(rows))
         if document.get("gain"):
             click.echo("\n" + gain_table(document["gain"]))
-    for line in [note for result in results for note in result.notes]:
-        say(line)
-    for line in [f"{one.id}: {note}" for one in demonstrations for note in one.notes]:
-        say(line)
-    finish([*failed, *(line for result in results for line in (*result.damage, *result.skipped))])
 
 
 def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
@@ -186,52 +190,6 @@ def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
         "time": options.time.value,
         "frame": options.frame,
         "wrench_frame": options.wrench_frame,
+        "wrench": options.forces is not Forces.IGNORED,
         "map": None if map_file is None else map_file.name,
     }
-
-
-#: The hashes of a recording's files, and what came out of it.
-_Result = tuple[tuple[Input, ...], Extraction]
-
-
-def _all_extracted(
-    logs: Sequence[Path], settings: ExtractSettings, options: LoadOptions, *, join: bool
-) -> tuple[list[_Result], list[str]]:
-    """What came out of each recording, and what is wrong with those of which nothing did."""
-    refused: list[LogError] = []
-    # where all are pieces of one recording none may be missing
-    sources = sources_of(logs, join=join, refused=None if join else refused)
-    good: dict[tuple[str, ...], _Result] = {}
-    failed: list[NavirlError] = [*refused]
-    sizes = [sum(path.stat().st_size for path in source.files) for source in sources]
-    done = 0
-    with bytes_bar("extract") as update:
-        # a lone recording is read here, so that the bar can follow its bytes
-        work = partial(_extracted, settings=settings, options=options, progress=update if len(sources) == 1 else None)
-        for source, size, result in zip(sources, sizes, map_in_order(work, sources), strict=True):
-            if isinstance(result, NavirlError):
-                failed.append(result)
-            elif (key := tuple(sorted(file.sha256 for file in result[0]))) in good:
-                failed.append(DemonstrationError(f"{source.name}: the same recording as {good[key][1].log}"))
-            else:
-                good[key] = result
-            done += size
-            update(done, sum(sizes))
-    if len(failed) == 1 and not good:
-        raise failed[0]
-    if not good:
-        raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
-    return list(good.values()), [f"left out: {error}" for error in failed]
-
-
-def _extracted(
-    source: Source, settings: ExtractSettings, options: LoadOptions, progress: Progress | None
-) -> _Result | NavirlError:
-    """One recording's demonstrations, or why there are none: one bad log must not spoil the others."""
-    try:
-        with ThreadPoolExecutor(1) as pool:
-            hashes = pool.submit(lambda: tuple(Input.of(path) for path in source.files))
-            extraction = extract_one(load_recording(source, options, progress), settings)
-            return hashes.result(), extraction
-    except NavirlError as error:
-        return error

@@ -1,11 +1,12 @@
 """The tables of ``navirl extract``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import degrees, hypot
 from typing import Any
 
 from navirl_cli.commands.shared import text_table
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.extract import Extraction
 from navirl_cli.demos.lines import path_length_m
 
 #: Columns of the table, and how their numbers are written.
@@ -13,6 +14,7 @@ FORMATS = {
     "trial": "",
     "condition": "",
     "cycle": "d",
+    "set": "",
     "duration s": ".1f",
     "length m": ".2f",
     "cells": "d",
@@ -26,18 +28,20 @@ FORMATS = {
 
 def trial_row(d: Demonstration) -> dict[str, Any]:
     """One trial of the table, by its columns."""
-    strongest = max(d.contacts, key=lambda contact: hypot(*contact.impulse_ns), default=None)
+    contacts = d.contacts or ()
+    strongest = max(contacts, key=lambda contact: hypot(*contact.impulse_ns), default=None)
     values = (
         d.id,
         d.condition.value,
         d.cycle,
-        d.duration_s,
+        d.set,
+        None if d.laid_out_m_s is not None else d.duration_s,
         path_length_m(d.xy_m),
         len(d.cells),
-        len(d.contacts),
-        100 * d.contact_s / d.duration_s,
-        max((contact.peak_n for contact in d.contacts), default=None),
-        sum(hypot(*contact.impulse_ns) for contact in d.contacts),
+        None if d.contacts is None else len(d.contacts),
+        None if d.contact_s is None else 100 * d.contact_s / d.duration_s,
+        max((contact.peak_n for contact in contacts), default=None),
+        None if d.contacts is None else sum(hypot(*contact.impulse_ns) for contact in contacts),
         None if strongest is None else degrees(strongest.direction_rad),
     )
     return dict(zip(FORMATS, values, strict=True))
@@ -66,3 +70,15 @@ def gain_table(gain: dict[str, Any]) -> str:
     lines = [*gain["logs"], *([{"log": "all", **gain}] if len(gain["logs"]) > 1 else [])]
     rows = [[line["log"], *(format(line[field], style) for field, _, style in GAIN_FORMATS)] for line in lines]
     return text_table(["log", *(heading for _, heading, _ in GAIN_FORMATS)], rows)
+
+
+def published_notes(results: Iterable[Extraction]) -> list[str]:
+    """How many paths have the cells that were published with their log."""
+    notes = []
+    for result in results:
+        other = [name for name, same in result.published.items() if not same]
+        if result.published:
+            told = f"; not those of {', '.join(other)}" if other else ""
+            total = len(result.published)
+            notes.append(f"{result.log}: cells as published with it: {total - len(other)} of {total} paths{told}")
+    return notes

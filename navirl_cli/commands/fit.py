@@ -207,13 +207,18 @@ def _chosen(
     demos: Path, conditions: tuple[str, ...], cycle: int | None, *, only_corrected: bool
 ) -> list[Demonstration]:
     """The demonstrations of a file that are asked for."""
-    return [
+    chosen = [
         d
         for d in demonstrations_in(demos)
-        if (not conditions or d.condition.value in conditions)
-        and (cycle is None or d.cycle == cycle)
-        and (d.corrected or not only_corrected)
+        if (not conditions or d.condition.value in conditions) and (cycle is None or d.cycle == cycle)
     ]
+    unknown = [d.id for d in chosen if d.corrected is None]
+    if only_corrected and unknown:
+        raise DemonstrationError(
+            f"{demos}: --only-corrected: whether the person intervened is unknown of {', '.join(unknown)}, extracted "
+            "without a wrench; choose with --condition and --cycle"
+        )
+    return [d for d in chosen if d.corrected or not only_corrected]
 
 
 def _evidence(chosen: list[Demonstration], steps: str) -> tuple[list[Demonstration], Evidence]:

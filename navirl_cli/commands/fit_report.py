@@ -92,7 +92,7 @@ def _correlations(found: Fit) -> str:
 def remarks(chosen: list[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
     """What a user may not have meant."""
     lines = []
-    alone = sum(not demonstration.corrected for demonstration in chosen)
+    alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(
             f"{alone} of {len(chosen)} demonstrations show no intervention: they teach what the robot does by itself; "

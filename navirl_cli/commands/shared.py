@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
@@ -122,6 +122,20 @@ def echo_json(document: Any) -> None:
 def say(line: str) -> None:
     """A diagnostic on stderr."""
     click.echo(f"navirl: {line}", err=True)
+
+
+def merged(lines: Iterable[str]) -> list[str]:
+    """Lines ``name: text`` with the names of equal texts put together, each where it first stands."""
+    names: dict[str, list[str]] = {}
+    for line in lines:
+        name, _, text = line.partition(": ")
+        names.setdefault(text, []).append(name)
+    return [f"{_listed(list(dict.fromkeys(own)))}: {text}" for text, own in names.items()]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names, but not more than a line takes."""
+    return ", ".join(names) if len(names) < 5 else f"{names[0]} and {len(names) - 1} others"
 
 
 def finish(lost: Sequence[str]) -> None:

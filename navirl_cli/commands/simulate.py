@@ -6,8 +6,7 @@ from pathlib import Path
 import click
 
 from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option, text_table
-from navirl_cli.errors import ArtefactError
-from navirl_cli.files import check_writable
+from navirl_cli.files import check_writable, make_folder
 from navirl_cli.parallel import map_in_order
 
 
@@ -23,10 +22,7 @@ def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
     from it: two passes, a fit, two passes along learnt paths, two passes with a joystick, one left to obstacle
     avoidance. What truly happened stands in the metadata record navirl.truth, which no other command reads.
     """
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ArtefactError(f"{output}: cannot be made a folder: {error.strerror}; choose another with -o") from error
+    make_folder(output)
     paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
     for path in paths:
         check_writable(path, force=force)

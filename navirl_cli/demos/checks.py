@@ -5,7 +5,7 @@ import numpy as np
 from navirl_cli.demos.contact import Pushes, PushSettings, missing_s
 from navirl_cli.demos.grid import OCCUPIED_FROM, FloatArray, Grid, IntArray, is_costmap
 from navirl_cli.demos.lines import path_length_m, thinned
-from navirl_cli.demos.trials import Trial
+from navirl_cli.demos.trials import MIN_TRAVEL_M, Trial
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.logs.recording import Recording
 
@@ -34,15 +34,24 @@ def check_cells(cells: IntArray, xy_m: FloatArray, grid: Grid, robot_radius_m: f
         )
 
 
-def check_gaps(recording: Recording, trial: Trial, pushes: Pushes) -> None:
+def check_gaps(recording: Recording, trial: Trial, pushes: Pushes | None) -> None:
     """Two trials across a hole in the log must not pass for one, nor a dead sensor for a person who does not push."""
     t_ns = recording.t_ns[trial.first : trial.stop]
     hole = float(np.diff(t_ns).max(initial=0) / 1e9)
     if hole > POSE_GAP_S:
         raise DemonstrationError(f"poses are missing for {hole:.1f} s")
+    if pushes is None:
+        return
     silent = missing_s(pushes, int(t_ns[0]), int(t_ns[-1]))
     if silent > FORCE_GAP_S:
         raise DemonstrationError(f"the wrench is missing for {silent:.1f} s")
+
+
+def check_travel(xy_m: FloatArray) -> None:
+    """A robot that hardly moves shows no path."""
+    travelled = float(np.hypot(*(xy_m - xy_m[0]).T).max())
+    if travelled < MIN_TRAVEL_M:
+        raise DemonstrationError(f"the robot gets no farther than {travelled:.2f} m: an empty trial")
 
 
 def check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
@@ -67,8 +76,21 @@ def check_goal(grid: Grid, start: FloatArray, goal: tuple[float, float]) -> None
     )
 
 
-def recording_notes(recording: Recording, pushes: Pushes, push: PushSettings) -> list[str]:
+def recording_notes(recording: Recording, pushes: Pushes | None, push: PushSettings) -> list[str]:
     """What is odd about a recording as a whole."""
+    notes = ["contact is unknown: no wrench was read"] if pushes is None else _wrench_notes(pushes, push)
+    if recording.session.laid_out_m_s is not None:
+        notes.append(
+            f"its positions came without times, and were laid out at {recording.session.laid_out_m_s:g} m/s: durations "
+            "and speeds are not measured"
+        )
+    if is_costmap(recording.occupancy.data):
+        notes.append("its map is a costmap that is inflated already (cells of 99); --robot-radius does not grow it")
+    return [f"{recording.log}: {note}" for note in notes]
+
+
+def _wrench_notes(pushes: Pushes, push: PushSettings) -> list[str]:
+    """What is odd about the forces."""
     notes = []
     # A threshold within the noise finds contacts where there are none.
     least = NOISE_MARGIN * pushes.noise_n
@@ -80,9 +102,7 @@ def recording_notes(recording: Recording, pushes: Pushes, push: PushSettings) ->
     holes = int((np.diff(pushes.t_ns) > FORCE_HOLE_S * 1e9).sum())
     if holes:
         notes.append(f"the wrench breaks off for more than {FORCE_HOLE_S:g} s, {holes} x; straight lines bridge it")
-    if is_costmap(recording.occupancy.data):
-        notes.append("its map is a costmap that is inflated already (cells of 99); --robot-radius does not grow it")
-    return [f"{recording.log}: {note}" for note in notes]
+    return notes
 
 
 def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
@@ -98,7 +118,8 @@ def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
 def people_notes(recording: Recording, people: FloatArray) -> list[str]:
     """Nobody there at all, or where none can stand: in a wall, or off the map."""
     if len(people) == 0:
-        return ["no people in the scene; say where they stand with --person x,y"]
+        told = len(recording.people_t_ns) > 0
+        return ["nobody is in the scene" if told else "no people in the scene; say where they stand with --person x,y"]
     occupancy = recording.occupancy
     walls = Grid(occupancy.data >= OCCUPIED_FROM, occupancy.resolution_m, occupancy.origin_m)
     inside, blocked = walls.contains(walls.cells_of(people)), walls.is_occupied(walls.cells_of(people))

@@ -42,6 +42,10 @@ class Pushes:
     #: Standard deviation of each component of the low-passed force without contact, N.
     noise_n: float
 
+    def force_at(self, t_ns: IntArray) -> FloatArray:
+        """(m, 2) N, map frame, at other times, between samples on straight lines."""
+        return np.stack([np.interp(t_ns, self.t_ns, axis) for axis in self.force_n.T], axis=1)
+
 
 def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     """Find the person's pushes in a recording.

@@ -15,6 +15,8 @@ class Condition(StrEnum):
     FORCE = "force"
     JOYSTICK = "joystick"
     AUTONOMOUS = "autonomous"
+    #: The log does not say, and holds no wrench that would tell.
+    UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,9 @@ class Demonstration:
     id: str
     participant: str
     condition: Condition
-    #: True where the person intervened (pushed, or moved the joystick), so that the path shows their wish.
-    corrected: bool
+    #: True where the person intervened (pushed, or moved the joystick), so that the path shows their wish; None where
+    #: nobody knows.
+    corrected: bool | None
     #: Number of the interaction cycle (Sec. IV-C), or None where the log does not say.
     cycle: int | None
     #: Log time of the trial's start, ns since the epoch of the log's clock.
@@ -102,7 +105,8 @@ class Demonstration:
     yaw_rad: FloatArray
     #: (n, 2) N, map frame, bias removed and low-passed; None where the log holds no wrench.
     force_n: FloatArray | None
-    contacts: tuple[Contact, ...]
+    #: None where contact is unknown, for want of a wrench.
+    contacts: tuple[Contact, ...] | None
     #: The announced goal, m, map frame.
     goal_m: tuple[float, float]
     #: (p, 2) m, map frame: where the people stand; the mean over the trial of one who moves.
@@ -117,6 +121,13 @@ class Demonstration:
     log: str = ""
     #: How the people moved, one track for each of people_m in the same order; none at all where nobody did.
     tracks: tuple[PersonTrack, ...] = ()
+    #: What the trial was for, where it is not the session's main task: "obstacle course", say.
+    set: str | None = None
+    #: (k, 2) m, map frame: the line that the robot's navigation followed, where the log says; else the scene's nominal
+    #: path stands for it.
+    nominal_m: FloatArray | None = None
+    #: Speed at which positions without times were laid out, m/s; None where t_s was measured.
+    laid_out_m_s: float | None = None
     #: What a reader of the results should know of this trial.
     notes: tuple[str, ...] = field(default=())
 
@@ -130,6 +141,7 @@ class Demonstration:
             ("force_n", self.force_n, (n, 2)),
             ("people_m", self.people_m, (len(self.people_m), 2)),
             ("cells", self.cells, (len(self.cells), 2)),
+            ("nominal_m", self.nominal_m, None if self.nominal_m is None else (len(self.nominal_m), 2)),
         ):
             if value is not None and value.shape != shape:
                 self._refuse(f"{name} needs the shape {shape}, found {value.shape}")
@@ -156,6 +168,6 @@ class Demonstration:
         return float(self.t_s[-1] - self.t_s[0])
 
     @property
-    def contact_s(self) -> float:
-        """Time in contact, s."""
-        return sum(contact.duration_s for contact in self.contacts)
+    def contact_s(self) -> float | None:
+        """Time in contact, s; None where it is unknown."""
+        return None if self.contacts is None else sum(contact.duration_s for contact in self.contacts)

@@ -1,8 +1,9 @@
 """From a recording to its demonstrations."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,23 +12,28 @@ from navirl_cli.demos.checks import (
     check_gaps,
     check_goal,
     check_start,
+    check_travel,
     jump_notes,
     people_notes,
     recording_notes,
 )
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
-from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
-from navirl_cli.demos.grid import Grid, IntArray, grid_from_occupancy
+from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
-from navirl_cli.demos.trials import MIN_TRAVEL_M, Split, Trial, trials_of
+from navirl_cli.demos.trials import Split, Trial, trials_of
 from navirl_cli.errors import DemonstrationError, NavirlError
-from navirl_cli.logs.recording import Declared, Recording
+from navirl_cli.logs.recording import Declared, Published, Recording
+
+Entry = TypeVar("Entry", Declared, Published)
 
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
 STICK_DEAD_ZONE = 0.1
 STEERED_S = 0.3
+#: Of a robot that nobody says anything about, m.
+ROBOT_RADIUS_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,8 @@ class ExtractSettings:
 
     split: Split = Split.GOAL
     resolution_m: float = 0.1
-    robot_radius_m: float = 0.3
+    #: None: what the log's session record says, else ROBOT_RADIUS_M.
+    robot_radius_m: float | None = None
     rasterizer: Rule = Rule.STUDY
     push: PushSettings = field(default_factory=PushSettings)
     participant: str | None = None
@@ -65,6 +72,10 @@ class Extraction:
     notes: tuple[str, ...]
     #: How fast the robot gives way to a push; None where nobody asked, or nobody pushed.
     gain: Gain | None = None
+    #: Names of the paths whose cells were published with the log, and whether ours are the same.
+    published: Mapping[str, bool] = field(default_factory=dict)
+    #: Times in which a course was completed, s, by modality, as the log's session record says.
+    completion_s: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
 def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
@@ -83,13 +94,13 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         NavirlError: Nothing in the recording is usable.
     """
     recording = _with_said(recording, settings)
-    occupancy = recording.occupancy
-    grid = grid_from_occupancy(
-        occupancy.data, occupancy.resolution_m, occupancy.origin_m, settings.robot_radius_m
-    ).resampled(settings.resolution_m)
-    pushes = pushes_of(recording, settings.push)
+    occupancy, radius_m = recording.occupancy, _radius_m(recording, settings)
+    grid = grid_from_occupancy(occupancy.data, occupancy.resolution_m, occupancy.origin_m, radius_m).resampled(
+        settings.resolution_m
+    )
+    pushes = None if recording.wrench is None else pushes_of(recording, settings.push)
     trials = trials_of(recording, settings.split)
-    participant = settings.participant or recording.participant or recording.log.partition(".mcap")[0]
+    participant = settings.participant or recording.session.participant or recording.log.partition(".mcap")[0]
     found: list[Demonstration] = []
     skipped: list[tuple[int, str]] = []
     for number, trial in enumerate(trials, start=1):
@@ -103,10 +114,20 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
-    gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain else None
+    gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: no trial holds a push to the side, so that its gain is unknown")
-    return Extraction(recording.log, tuple(found), len(trials), lines, recording.damage, tuple(notes), gain)
+    return Extraction(
+        log=recording.log,
+        demonstrations=tuple(found),
+        trials=len(trials),
+        skipped=lines,
+        damage=recording.damage,
+        notes=tuple(notes),
+        gain=gain,
+        published=_published(recording, found),
+        completion_s=recording.session.completion_s,
+    )
 
 
 def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
@@ -145,58 +166,64 @@ def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
 
 
 def _demonstration(
-    recording: Recording, trial: Trial, pushes: Pushes, grid: Grid, settings: ExtractSettings, name: str
+    recording: Recording, trial: Trial, pushes: Pushes | None, grid: Grid, settings: ExtractSettings, name: str
 ) -> Demonstration:
     """One trial as a demonstration."""
     span = slice(trial.first, trial.stop)
     t_ns, xy = recording.t_ns[span], recording.xy_m[span]
     start_ns, stop_ns = int(t_ns[0]), int(t_ns[-1])
-    travelled = float(np.hypot(*(xy - xy[0]).T).max())
-    if travelled < MIN_TRAVEL_M:
-        raise DemonstrationError(f"the robot gets no farther than {travelled:.2f} m: an empty trial")
+    check_travel(xy)
     check_gaps(recording, trial, pushes)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
     people = _people(recording, settings, start_ns, stop_ns)
-    check_start(people.people_m, xy[0], settings.robot_radius_m)
-    cells = rasterize(xy, grid, settings.rasterizer)
-    free = grid.freed(cells)
-    check_cells(cells, xy, grid, settings.robot_radius_m)
+    radius_m = _radius_m(recording, settings)
+    check_start(people.people_m, xy[0], radius_m)
+    cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
         check_goal(free, xy[0], goal)
-    contacts = contacts_within(pushes, start_ns, stop_ns)
-    steered = _steered_s(recording, start_ns, stop_ns) > STEERED_S
-    declared = _declared(recording, start_ns, stop_ns)
-    observed = Condition.JOYSTICK if steered else Condition.FORCE if contacts else Condition.AUTONOMOUS
-    path_notes = _path_notes(trial, cells, grid, float(np.hypot(*(xy[-1] - goal))))
-    jumps = jump_notes(recording, start_ns, stop_ns)
+    declared = _nearest(recording.session.declared, start_ns, stop_ns) or Declared(start_ns)
+    contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
+    seen, corrected = _seen(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
+    notes = [*_path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
-        condition=observed if declared.condition is None else _condition(declared.condition),
-        corrected=bool(contacts) or steered,
+        condition=seen if declared.condition is None else _condition(declared.condition),
+        corrected=corrected,
         cycle=declared.cycle,
         start_ns=start_ns,
         t_s=(t_ns - start_ns) / 1e9,
         xy_m=xy,
         yaw_rad=recording.yaw_rad[span],
-        force_n=np.stack([np.interp(t_ns, pushes.t_ns, axis) for axis in pushes.force_n.T], axis=1),
+        force_n=None if pushes is None else pushes.force_at(t_ns),
         contacts=contacts,
         goal_m=goal,
         people_m=people.people_m,
-        robot_radius_m=settings.robot_radius_m,
+        robot_radius_m=radius_m,
         grid=free,
         cells=cells,
         log=recording.log,
         tracks=people.tracks,
-        notes=(*path_notes, *jumps, *people.notes, *people_notes(recording, people.people_m)),
+        set=declared.set,
+        nominal_m=declared.nominal_m,
+        laid_out_m_s=recording.session.laid_out_m_s,
+        notes=(*notes, *people.notes, *people_notes(recording, people.people_m)),
     )
 
 
-def _path_notes(trial: Trial, cells: IntArray, grid: Grid, from_goal_m: float) -> list[str]:
-    """What is odd about where a trial led."""
+def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple[IntArray, Grid]:
+    """The path's cells, and the map with these freed."""
+    cells = rasterize(xy_m, grid, rule)
+    free = grid.freed(cells)
+    check_cells(cells, xy_m, grid, radius_m)
+    return cells, free
+
+
+def _path_notes(trial: Trial, cells: IntArray, grid: Grid, from_goal_m: FloatArray) -> list[str]:
+    """What is odd about where a trial led; it ended (2,) m away from its goal."""
     notes = []
     if not trial.arrived:
-        notes.append(f"ended {from_goal_m:.2f} m from its goal; its last cell stands for the goal")
+        notes.append(f"ended {np.hypot(*from_goal_m):.2f} m from its goal; its last cell stands for the goal")
     blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
     if blocked:
         notes.append(f"{blocked} driven cells that the map calls occupied were freed")
@@ -219,13 +246,37 @@ def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:
     return float(held[recording.command[first : stop - 1] > STICK_DEAD_ZONE].sum())
 
 
-def _declared(recording: Recording, start_ns: int, stop_ns: int) -> Declared:
-    """What the protocol says of the trial: the entry whose time lies nearest to the trial's start."""
-    if not recording.declared:
-        return Declared(start_ns)
-    nearest = min(recording.declared, key=lambda entry: abs(entry.t_ns - start_ns))
+def _radius_m(recording: Recording, settings: ExtractSettings) -> float:
+    """The robot's radius as the user says, else as the log does, m."""
+    said = (settings.robot_radius_m, recording.session.robot_radius_m, ROBOT_RADIUS_M)
+    return next(radius for radius in said if radius is not None)
+
+
+def _published(recording: Recording, found: Iterable[Demonstration]) -> dict[str, bool]:
+    """Whether cells are as published, by the published path's name; one without a demonstration is not."""
+    known = recording.session.published
+    same = dict.fromkeys((entry.name for entry in known), False)
+    for one in found:
+        entry = _nearest(known, one.start_ns, one.start_ns + round(one.duration_s * 1e9))
+        if entry is not None:
+            same[entry.name] = np.array_equal(entry.cells, one.cells)
+    return same
+
+
+def _nearest(entries: Sequence[Entry], start_ns: int, stop_ns: int) -> Entry | None:
+    """What a metadata record says of the trial: the entry whose time lies nearest to the trial's start."""
+    nearest = min(entries, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
     # An entry far from the start belongs to another trial.
-    return nearest if abs(nearest.t_ns - start_ns) < (stop_ns - start_ns) else Declared(start_ns)
+    return nearest if nearest is not None and abs(nearest.t_ns - start_ns) < (stop_ns - start_ns) else None
+
+
+def _seen(contacts: Sequence[Contact] | None, *, steered: bool) -> tuple[Condition, bool | None]:
+    """The condition that joystick and wrench show, and whether the person intervened."""
+    if steered:
+        return Condition.JOYSTICK, True
+    if contacts is None:
+        return Condition.UNKNOWN, None
+    return (Condition.FORCE, True) if contacts else (Condition.AUTONOMOUS, False)
 
 
 def _condition(name: str) -> Condition:

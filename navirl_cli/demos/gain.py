@@ -162,7 +162,7 @@ def _numbered(groups: Sequence[IntArray]) -> IntArray:
 def _sideways_pushes(one: Demonstration, pushes: Pushes, begins_n: float) -> list[tuple[float, float]]:
     """First and last instant, s since the trial's start, of the contacts that push to the side."""
     found = []
-    for contact in one.contacts:
+    for contact in one.contacts or ():
         ends_ns = [one.start_ns + round(second * 1e9) for second in (contact.start_s, contact.end_s)]
         first, last = np.searchsorted(pushes.t_ns, ends_ns)
         if np.sqrt(np.mean(pushes.base_n[first : last + 1, 1] ** 2)) >= begins_n / 2:

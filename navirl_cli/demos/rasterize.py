@@ -62,7 +62,7 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
     Source: the study's published paths (Kollmitz et al., IROS 2020); the rule as facts about them.
     """
     # With cell centres at integers, so that neighbours are integer offsets.
-    line = line - 0.5
+    rest = _Rest(line - 0.5)
     here, last = ends
     path = [here]
     limit = PATIENCE * (int(np.abs(np.diff(line, axis=0)).sum()) + 8)
@@ -77,20 +77,37 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
         options = here + MOVES
         if before is not None:
             options = options[(options != before).any(axis=1)]
-        before, (here, line) = here, _nearest(options, line)
+        before, here = here, options[rest.cut_nearest(options)]
         path.append(here)
     return np.array(path)
 
 
-def _nearest(options: IntArray, line: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The option nearest to the line, and the line from that nearest point on."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    away = options[:, None, :] - start[None, :, :]
-    squared = (along**2).sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        share = np.clip((away * along).sum(axis=2) / squared, 0.0, 1.0)
-    share = np.where(squared > 0, share, 0.0)
-    distance = ((away - share[..., None] * along) ** 2).sum(axis=2)
-    option, segment = np.unravel_index(int(np.argmin(distance)), distance.shape)
-    cut = start[segment] + share[option, segment] * along[segment]
-    return options[option], np.concatenate([cut[None], line[segment + 1 :]])
+class _Rest:
+    """What is left of a line, as segments of which the first is cut shorter and shorter."""
+
+    def __init__(self, line: FloatArray) -> None:
+        #: By axis: where segments end, where they start, and how far they lead.
+        self.end, self.start = line[1:].T, line[:-1].T.copy()
+        self.along = self.end - self.start
+        self.squared = (self.along**2).sum(axis=0)
+        self.squared[self.squared == 0] = 1.0  # their start is their only point
+        self.first = 0
+
+    def cut_nearest(self, options: IntArray) -> int:
+        """Cut the line at its point nearest to any of the (k, 2) options, and tell which option that is."""
+        left = slice(self.first, None)
+        (sx, sy), (ax, ay) = self.start[:, left], self.along[:, left]
+        # Few operations on whole arrays: a path takes some sixty of these steps.
+        dx, dy = options[:, 0, None] - sx, options[:, 1, None] - sy
+        share = (dx * ax + dy * ay) / self.squared[left]
+        np.maximum(share, 0.0, out=share)
+        np.minimum(share, 1.0, out=share)
+        dx -= share * ax
+        dy -= share * ay
+        option, segment = divmod(int((dx * dx + dy * dy).argmin()), len(sx))
+        self.first += segment
+        k = self.first
+        self.start[:, k] += share[option, segment] * self.along[:, k]
+        self.along[:, k] = self.end[:, k] - self.start[:, k]
+        self.squared[k] = (self.along[:, k] ** 2).sum() or 1.0
+        return option

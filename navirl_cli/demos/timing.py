@@ -57,8 +57,15 @@ def steps_in_contact(demonstration: Demonstration) -> NDArray[np.bool_]:
 
     Returns:
         (k - 1,) one for each step between successive cells.
+
+    Raises:
+        DemonstrationError: Contact is unknown.
     """
     d = demonstration
+    if d.contacts is None:
+        raise DemonstrationError(
+            f"demonstration {d.id}: contact is unknown, since it was extracted without a wrench; learn from all steps"
+        )
     times = cell_times_s(d.xy_m, d.t_s, d.cells, d.grid)
     pushed = np.zeros(len(times) - 1, dtype=bool)
     for contact in d.contacts:

@@ -47,9 +47,9 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
     """Split a recording into trials.
 
     ``goal``: a trial starts when a goal is announced and ends where the robot first comes to rest near it, else where
-    it came nearest before the next goal, so that the drive back belongs to no trial. Saying the present goal again
-    starts none, unless the robot was there and has left. ``stop``: trials are the drives between rests. ``none``: one
-    trial.
+    it came nearest before the next goal, so that the drive back belongs to no trial; where the session record says when
+    it ended, it ends there. Saying the present goal again starts none, unless the robot was there and has left.
+    ``stop``: trials are the drives between rests. ``none``: one trial.
 
     Args:
         recording: Poses and goals.
@@ -120,11 +120,22 @@ def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], g
     first, border = span
     distance = np.hypot(*(recording.xy_m[first:border] - goal).T)
     target = (float(goal[0]), float(goal[1]))
+    said = _said_stop(recording, first, border)
+    if said is not None:
+        return Trial(first, said, target, arrived=bool(distance[said - first - 1] < ARRIVED_M))
     resting = np.flatnonzero(standing[first:border] & (distance < ARRIVED_M) & _has_left(distance))
     if len(resting):
         return Trial(first, first + int(resting[0]) + 1, target)
     nearest = int(distance.argmin())
     return Trial(first, first + max(nearest, 1) + 1, target, arrived=bool(distance[nearest] < ARRIVED_M))
+
+
+def _said_stop(recording: Recording, first: int, border: int) -> int | None:
+    """One past the last pose of the trial that starts with a pose, where the session record says when it ended."""
+    for entry in recording.session.declared:
+        if entry.stop_ns is not None and np.searchsorted(recording.t_ns, entry.t_ns) == first:
+            return int(np.clip(np.searchsorted(recording.t_ns, entry.stop_ns, side="right"), first + 2, border))
+    return None
 
 
 def _has_left(distance: FloatArray) -> BoolArray:

@@ -23,7 +23,7 @@ KINDS: dict[str, str] = {
     DRIVEN: "the demonstrated poses",
     ON_GRID: "the demonstrated path through the centres of its cells, comparable with learnt paths",
     LEARNT: "paths drawn from the learnt policy, through the centres of cells",
-    NOMINAL: "the shortest way on the map, as if nobody were there",
+    NOMINAL: "the line that the log says the navigation followed, else the shortest way on the map without people",
     AVOIDANCE: "the shortest way on the grid around people as obstacles of radius 0.25 m",
 }
 
@@ -51,15 +51,24 @@ class Comparison:
     notes: tuple[str, ...]
 
 
-def _rank(demonstration: Demonstration) -> tuple[int, int]:
-    """Order of the groups: force first, by cycle, then joystick, then autonomous."""
-    return list(Condition).index(demonstration.condition), demonstration.cycle or 0
+def by_group(demonstrations: Iterable[Demonstration]) -> dict[str, list[Demonstration]]:
+    """Demonstrations by group: force first, by cycle, then joystick, then autonomous; special sets after the rest."""
+    order = list(Condition)
+    groups: dict[str, list[Demonstration]] = {}
+    for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.set or "", one.cycle or 0)):
+        groups.setdefault(group_of(one), []).append(one)
+    return groups
 
 
 def group_of(demonstration: Demonstration) -> str:
-    """The group of a demonstration: its condition, and its cycle where known."""
-    cycle = "" if demonstration.cycle is None else f", cycle {demonstration.cycle}"
-    return demonstration.condition.value + cycle
+    """The group of a demonstration: its condition, its cycle and its set where known.
+
+    A robot that drives by itself is what its set says: "obstacle avoidance".
+    """
+    alone = demonstration.condition is Condition.AUTONOMOUS and demonstration.set is not None
+    condition = [] if alone else [demonstration.condition.value]
+    cycle = [] if demonstration.cycle is None else [f"cycle {demonstration.cycle}"]
+    return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
 
 
 def compare(
@@ -104,9 +113,9 @@ def compare(
                 driven.append((demonstration.id, group, measured[0]))
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    order = list(dict.fromkeys(group_of(one) for one in sorted(demonstrations, key=_rank)))
+    order = list(by_group(demonstrations))
     ordered = sorted(collected, key=lambda key: (order.index(key[0]), list(KINDS).index(key[1])))
-    groups = tuple(_summary(group, kind, collected[group, kind]) for group, kind in ordered)
+    groups = tuple(summary_of(group, kind, collected[group, kind]) for group, kind in ordered)
     return Comparison(groups, tuple(driven), tuple(notes))
 
 
@@ -115,7 +124,7 @@ def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict
     lines = {
         DRIVEN: [demonstration.xy_m],
         ON_GRID: [demonstration.grid.centres_of(demonstration.cells)],
-        NOMINAL: [scene.nominal_line_m()],
+        NOMINAL: [scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m],
     }
     try:
         clearance = demonstration.robot_radius_m + PERSON_RADIUS_M
@@ -125,7 +134,7 @@ def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict
     return lines
 
 
-def _summary(group: str, kind: str, measured: Iterable[PathMetrics]) -> GroupMetrics:
+def summary_of(group: str, kind: str, measured: Iterable[PathMetrics]) -> GroupMetrics:
     """Mean and standard deviation over the paths that have a value (distance to people needs people)."""
     mean, spread = {}, {}
     paths = list(measured)

@@ -1,6 +1,5 @@
 """All demonstrated paths over their map (Fig. 3)."""
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,10 +11,10 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
+from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.compare import group_of
+from navirl_cli.evaluation.compare import by_group
 from navirl_cli.figures.ground import (
     Window,
     draw_goals,
@@ -80,7 +79,7 @@ def draw_paths(
         raise DemonstrationError("no demonstration to draw")
     grids = _maps(demonstrations)
     obstacles = [draw_obstacles(axes, grid) for grid in grids]
-    groups = _by_group(demonstrations)
+    groups = by_group(demonstrations)
     lines, contacts = [], []
     for group, members in groups.items():
         for one in members:
@@ -97,15 +96,6 @@ def draw_paths(
         marks = ground_handles(people, robots, nominal=False, filled=True)
         legend_below(axes, [*_group_handles(groups, in_contact=bool(contacts)), *marks])
     return DrawnPaths(axes, obstacles, lines, contacts, people, robots)
-
-
-def _by_group(demonstrations: Iterable[Demonstration]) -> dict[str, list[Demonstration]]:
-    """Demonstrations by group: force first, by cycle, then joystick, then autonomous."""
-    groups: dict[str, list[Demonstration]] = defaultdict(list)
-    order = list(Condition)
-    for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.cycle or 0)):
-        groups[group_of(one)].append(one)
-    return groups
 
 
 def _maps(demonstrations: Iterable[Demonstration]) -> list[Grid]:
@@ -133,7 +123,7 @@ def _path(axes: Axes, one: Demonstration, colour: str) -> Line2D:
 def _contacts(axes: Axes, one: Demonstration, colour: str) -> list[Line2D]:
     """The stretches of a path on which the person pushed."""
     band: dict[str, Any] = {"color": colour, "linewidth": _CONTACT_PT, "solid_capstyle": "butt", "zorder": 3}
-    return [axes.plot(*_stretch(one, contact).T, **band)[0] for contact in one.contacts]
+    return [axes.plot(*_stretch(one, contact).T, **band)[0] for contact in one.contacts or ()]
 
 
 def _stretch(one: Demonstration, contact: Contact) -> FloatArray:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,15 @@ _MAP_FRAME = "map"
 _STICK_REST, _RESTS = 0.05, 0.05
 
 
+class Forces(StrEnum):
+    """What becomes of the wrench."""
+
+    NEEDED = "needed"
+    #: Taken where the log holds one.
+    OPTIONAL = "optional"
+    IGNORED = "ignored"
+
+
 @dataclass(frozen=True)
 class LoadOptions:
     """What a user can say about a log."""
@@ -46,6 +56,7 @@ class LoadOptions:
     wrench_frame: str | None = None
     #: A map in place of the log's, in the fixed frame.
     occupancy: Occupancy | None = None
+    forces: Forces = Forces.NEEDED
     #: Refuse a log of which something is lost.
     strict: bool = False
 
@@ -83,18 +94,17 @@ def _loaded(source: Source, files: Sequence[Opened], options: LoadOptions, progr
     tables, damage = _read(log, contents, files, options, progress)
     setting, drawn = _setting(log, tables, options)
     poses = poses_of(next(iter(tables["odometry"]), None), setting)
-    wrench = _wrench(tables["wrench"][0], setting, poses.base, options.wrench_frame)
+    measured = tables.get("wrench", [])
+    wrench = _wrench(measured[0], setting, poses.base, options.wrench_frame) if measured else None
     people_t_ns, people = people_of(tables["people"], setting)
     goal_t_ns, goal_m = goals_of(next(iter(tables["goal"]), None), setting)
     command_t_ns, command = _commands(tables["joystick"], setting.clock)
-    participant, declared = session_of(log, contents)
     occupancy = occupancy_of(drawn, setting)
     lost = (*map(str, (*source.damage, *damage)), *setting.lost)
     if lost and options.strict:
         raise LogError(f"{log}: damaged, and --strict refuses it: {'; '.join(lost)}")
     return Recording(
         log=log,
-        participant=participant,
         t_ns=poses.t_ns,
         xy_m=poses.xy_m,
         yaw_rad=poses.yaw_rad,
@@ -106,7 +116,7 @@ def _loaded(source: Source, files: Sequence[Opened], options: LoadOptions, progr
         people=people,
         command_t_ns=command_t_ns,
         command=command,
-        declared=declared,
+        session=session_of(log, contents),
         velocity_m_s=poses.velocity_m_s,
         jumps=poses.jumps,
         damage=lost,
@@ -122,6 +132,9 @@ def _read(
     picked = choices(log, topics, options.topics)
     if options.occupancy is not None:
         del picked["map"]
+    lacking = not (picked["wrench"].topics or picked["wrench"].ambiguous)
+    if options.forces is Forces.IGNORED or (options.forces is Forces.OPTIONAL and lacking):
+        del picked["wrench"]
     for choice in picked.values():
         if is_missed(choice, picked):
             raise refusal(log, topics, choice)
@@ -135,8 +148,13 @@ def _setting(
     log: str, tables: Mapping[str, Sequence[Table]], options: LoadOptions
 ) -> tuple[Setting, tuple[Occupancy, str]]:
     """Clock and frames, and the map with its frame."""
-    reference = (*tables["odometry"], *tables["wrench"])[0]
-    clock = Clock(reference.stamped(), options.time)
+    references = (*tables["odometry"], *tables.get("wrench", ()))
+    if not references:
+        raise LogError(
+            f"{log}: expected odometry or a wrench, whose stamps are the recording's clock, found neither; "
+            "name the odometry with --topic odometry=/name"
+        )
+    clock = Clock(references[0].stamped(), options.time)
     tree = TransformTree(
         [link for table in tables["tf_static"] for link in links_of(_tf_columns(table), table.owner_counts)],
         [link for table in tables["tf"] for link in _moving(table, clock)],

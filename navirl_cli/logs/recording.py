@@ -1,5 +1,6 @@
 """A log as an extraction needs it: poses in the fixed frame, raw forces, people, goals, commands and the map."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,9 +8,14 @@ from numpy.typing import NDArray
 
 from navirl_cli.errors import LogError
 
-#: Name of the metadata record in which a log says what only the experimenter knows: keys "participant" (a name) and
-#: "trials" (JSON: a list of objects with "t_ns", the time of the trial's goal, and "cycle" and "condition").
+#: Name of the metadata record in which a log says what only the experimenter knows. Keys: "participant", a name; in
+#: JSON "trials", a list of objects with "t_ns", the time of the trial's goal, and any of "stop_ns", "cycle",
+#: "condition", "set" and "nominal_m"; "robot_radius_m"; "completion_s", lists of times by modality; and, where
+#: positions came without times, "laid_out_m_s", the speed at which they were laid out.
 SESSION_RECORD = "navirl.session"
+#: Name of the metadata record with cells that were published with the paths: key "cells", a JSON list of objects with
+#: "t_ns" (as above), "name" and "cells" (pairs column, row).
+PUBLISHED_RECORD = "navirl.published"
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -64,8 +70,38 @@ class Declared:
     """What the experimenter's protocol says of the trial that starts at a time."""
 
     t_ns: int
+    #: When it ended, ns; None: where the robot came to rest near its goal.
+    stop_ns: int | None = None
     cycle: int | None = None
     condition: str | None = None
+    #: What the trial was for, where it is not the session's main task: "obstacle course", say.
+    set: str | None = None
+    #: (k, 2) m, fixed frame: the line that the robot's navigation followed.
+    nominal_m: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Published:
+    """The cells that somebody else published for the trial that starts at a time."""
+
+    t_ns: int
+    name: str
+    #: (k, 2) column and row.
+    cells: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Session:
+    """What only the experimenter knows of a session."""
+
+    participant: str | None = None
+    declared: tuple[Declared, ...] = ()
+    published: tuple[Published, ...] = ()
+    robot_radius_m: float | None = None
+    #: Speed at which positions without times were laid out, m/s; None where times were measured.
+    laid_out_m_s: float | None = None
+    #: Times in which a course was completed, s, by modality.
+    completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -74,8 +110,6 @@ class Recording:
 
     #: File name of the log.
     log: str
-    #: Name from the session record, or None.
-    participant: str | None
     #: (n,) ns, increasing: the robot's poses in the fixed frame.
     t_ns: IntArray
     #: (n, 2) m and (n,) rad, fixed frame.
@@ -92,7 +126,7 @@ class Recording:
     #: (c,) ns and (c,) largest deflection of the joystick, 0..1.
     command_t_ns: IntArray
     command: FloatArray
-    declared: tuple[Declared, ...] = ()
+    session: Session = field(default_factory=Session)
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry does not say.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()

@@ -135,7 +135,8 @@ ROLES: Final = (
         kinds.WRENCHES,
         _wrench,
         "unfiltered before filtered, since extract filters without delay",
-        "record the force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster",
+        "record the force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster, "
+        "or extract with --no-wrench",
         needed=True,
     ),
     Role(

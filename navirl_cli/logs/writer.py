@@ -63,6 +63,13 @@ def header(t_ns: int, frame_id: str) -> Any:
     return message_type("std_msgs/msg/Header")(stamp=time_message(t_ns), frame_id=frame_id)
 
 
+def planar_pose(x: float, y: float, yaw: float) -> Any:
+    """A geometry_msgs/msg/Pose in the plane: x and y in m, yaw in rad."""
+    point = message_type("geometry_msgs/msg/Point")(float(x), float(y), 0.0)
+    turn = message_type("geometry_msgs/msg/Quaternion")(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
+    return message_type("geometry_msgs/msg/Pose")(point, turn)
+
+
 @dataclass(frozen=True)
 class _Channel:
     id: int

@@ -12,7 +12,7 @@ import numpy as np
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.logs.recording import SESSION_RECORD
-from navirl_cli.logs.writer import LogWriter, header, message_type
+from navirl_cli.logs.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.simulation import protocol, sensors
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
 from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M
@@ -138,12 +138,6 @@ class _Clock:
         return self.t_ns[steps], self._received[steps]
 
 
-def _pose(x: float, y: float, yaw: float) -> Any:
-    point = message_type("geometry_msgs/msg/Point")(float(x), float(y), 0.0)
-    turn = message_type("geometry_msgs/msg/Quaternion")(0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
-    return message_type("geometry_msgs/msg/Pose")(point, turn)
-
-
 def _transform(t_ns: int, parent: str, child: str, place: tuple[float, float, float], turn: FloatArray) -> Any:
     vector = message_type("geometry_msgs/msg/Vector3")(*(float(value) for value in place))
     quaternion = message_type("geometry_msgs/msg/Quaternion")(*(float(value) for value in turn))
@@ -159,7 +153,7 @@ def _write_scene(writer: LogWriter, session: protocol.Session, clock: _Clock) ->
     walls = session.hallway.walls
     rows, columns = walls.shape
     info = message_type("nav_msgs/msg/MapMetaData")(
-        header(first, "").stamp, float(np.float32(walls.resolution_m)), columns, rows, _pose(*walls.origin_m, 0.0)
+        header(first, "").stamp, float(np.float32(walls.resolution_m)), columns, rows, planar_pose(*walls.origin_m, 0.0)
     )
     data = (100 * walls.occupied.astype(np.int8)).reshape(-1)
     writer.message("/map", message_type("nav_msgs/msg/OccupancyGrid")(header(first, "map"), info, data), clock.at(0))
@@ -169,7 +163,7 @@ def _write_scene(writer: LogWriter, session: protocol.Session, clock: _Clock) ->
     x, y = session.hallway.person_m
     people = message_type("geometry_msgs/msg/PoseArray")
     for step in sensors.steps_at(sensors.PEOPLE_HZ, len(clock.t_ns)):
-        writer.message("/people", people(header(clock.t_ns[step], "map"), [_pose(x, y, np.pi)]), clock.at(step))
+        writer.message("/people", people(header(clock.t_ns[step], "map"), [planar_pose(x, y, np.pi)]), clock.at(step))
 
 
 def _write_passes(writer: LogWriter, session: protocol.Session, line: Timeline, clock: _Clock) -> None:
@@ -177,8 +171,8 @@ def _write_passes(writer: LogWriter, session: protocol.Session, line: Timeline, 
     stamped = message_type("geometry_msgs/msg/PoseStamped")
     for one, (announced, _, _) in zip(session.passes, line.spans, strict=True):
         head = header(clock.t_ns[announced], "map")
-        writer.message("/goal_pose", stamped(head, _pose(GOAL_X_M, LANE_Y_M, 0.0)), clock.at(announced))
-        points = [stamped(head, _pose(x, y, 0.0)) for x, y in one.plan.xy_m[::4]]
+        writer.message("/goal_pose", stamped(head, planar_pose(GOAL_X_M, LANE_Y_M, 0.0)), clock.at(announced))
+        points = [stamped(head, planar_pose(x, y, 0.0)) for x, y in one.plan.xy_m[::4]]
         writer.message("/plan", message_type("nav_msgs/msg/Path")(head, points), clock.at(announced + 1))
 
 
@@ -203,7 +197,7 @@ def _write_odometry(writer: LogWriter, odometry: sensors.Poses, clock: _Clock) -
     template = message_type("nav_msgs/msg/Odometry")(
         header(0, "odom"),
         "base_link",
-        message_type("geometry_msgs/msg/PoseWithCovariance")(_pose(0, 0, 0), covariance),
+        message_type("geometry_msgs/msg/PoseWithCovariance")(planar_pose(0, 0, 0), covariance),
         message_type("geometry_msgs/msg/TwistWithCovariance")(twist, covariance),
     )
     steps = sensors.steps_at(sensors.ODOMETRY_HZ, len(clock.t_ns))
