@@ -1,7 +1,5 @@
 """The published study: likelihoods, paths and cells against independent results, where the data are at hand."""
 
-import io
-import pickle
 from dataclasses import replace
 
 import factories as make
@@ -139,16 +137,3 @@ def test_no_random_start_of_another_method_ends_higher(study, names, starts, val
 @pytest.mark.parametrize("names", [SECOND, BOTH], ids=["second", "both"])
 def test_none_of_fifty_random_starts_of_another_method_ends_higher(study, names, l2):
     check_best(study, names, l2, 50)
-
-
-@pytest.mark.parametrize(("module", "name"), [("os", "system"), ("builtins", "eval"), ("numpy", "load")])
-def test_pickles_that_name_anything_else_are_refused(module, name):
-    forged = f"c{module}\n{name}\n(S'true'\ntR.".encode()
-    with pytest.raises(pickle.UnpicklingError, match=f"refused to resolve {module}.{name}"):
-        study_data.Reader(io.BytesIO(forged), encoding="latin-1").load()
-
-
-def test_a_pickle_of_objects_in_an_array_is_refused():
-    dtype = study_data.Kept("O8", 0, 1)
-    with pytest.raises(pickle.UnpicklingError, match="no numbers: O8"):
-        study_data.scalar(dtype, "x")

@@ -1,0 +1,105 @@
+"""``navirl import-study``: the published user study as logs."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import click
+
+from navirl_cli.commands.shared import (
+    FilePath,
+    echo_json,
+    finish,
+    force_option,
+    json_option,
+    output_option,
+    progress_bar,
+    say,
+    text_table,
+)
+from navirl_cli.errors import ArtefactError
+from navirl_cli.files import check_writable, make_folder
+from navirl_cli.parallel import map_in_order
+from navirl_cli.published.runs import Run, runs_in
+
+
+@dataclass(frozen=True)
+class _Imported:
+    """One participant's log; no path where nothing could be used."""
+
+    participant: str
+    lost: tuple[str, ...]
+    path: Path | None = None
+    trials: int = 0
+    completion_s: dict[str, tuple[float, ...]] | None = None
+    size_bytes: int = 0
+
+
+@click.command("import-study")
+@click.argument("runs", type=FilePath)
+@output_option("Folder for the logs, one a participant; made where it is missing.")
+@force_option
+@json_option
+def import_study(runs: Path, output: Path, force: bool, as_json: bool) -> None:
+    """Turn the published user study (RUNS) into logs.
+
+    RUNS is the archive runs.tar.gz that the paper's authors publish, the folder into which it was unpacked, or one
+    participant's folder. The logs are what a robot would have recorded, but that the study has neither times nor
+    forces: positions are laid out at 0.4 m/s, and extract wants --no-wrench. The published cells stand in the metadata
+    record navirl.published. The study's pickles are read as data; nothing in them is run.
+    """
+    found, lost = runs_in(runs)
+    jobs = [(number, run, output / f"{run.name}.mcap") for number, run in enumerate(found)]
+    make_folder(output)
+    for _, _, path in jobs:
+        check_writable(path, force=force)
+    imported = []
+    with progress_bar("import-study", len(jobs)) as update:
+        for one in map_in_order(partial(_imported, force=force), jobs):
+            imported.append(one)
+            update(len(imported), one.participant)
+    lost += [line for one in imported for line in one.lost]
+    written = [one for one in imported if one.path is not None]
+    if not written:
+        for line in lost:
+            say(line)
+        raise ArtefactError(
+            f"{runs}: expected the study's published files, found nothing that can be used; fetch them anew"
+        )
+    if as_json:
+        echo_json({"logs": [_document(one) for one in written], "lost": lost})
+    else:
+        click.echo(text_table(("log", "trials", "course completed in", "size MB"), [_row(one) for one in written]))
+    finish(lost)
+
+
+def _imported(job: tuple[int, Run, Path], force: bool) -> _Imported:
+    """Write one participant's log."""
+    from navirl_cli.published.log import write_log
+    from navirl_cli.published.participant import participant_of
+
+    number, run, path = job
+    try:
+        participant = participant_of(run)
+    except ArtefactError as error:
+        return _Imported(run.name, (str(error),))
+    write_log(participant, number, path, force=force)
+    times = dict(participant.completion_s)
+    return _Imported(run.name, participant.lost, path, len(participant.paths), times, path.stat().st_size)
+
+
+def _row(one: _Imported) -> tuple[str, str, str, str]:
+    """Of the table."""
+    times = [f"{modality} {s:.1f} s" for modality, several in (one.completion_s or {}).items() for s in several]
+    return str(one.path), str(one.trials), ", ".join(times) or "not known", f"{one.size_bytes / 1e6:.2f}"
+
+
+def _document(one: _Imported) -> dict[str, object]:
+    """For scripts."""
+    return {
+        "log": str(one.path),
+        "participant": one.participant,
+        "trials": one.trials,
+        "completion_s": one.completion_s,
+        "size_bytes": one.size_bytes,
+    }

@@ -1,0 +1,1 @@
+"""The published user study: its archive -> paths, map, completion times -> MCAP logs."""

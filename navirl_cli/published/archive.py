@@ -1,0 +1,119 @@
+"""The published archive, read member by member into memory, whatever it holds."""
+
+import gzip
+import tarfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path, PurePosixPath
+from typing import IO, Final, cast
+
+from navirl_cli.errors import ArtefactError
+
+#: Most bytes of a file, of an archive unpacked, and of the lengths and names before a member; most members. The
+#: published files take a quarter of a megabyte each.
+MOST_OF_A_FILE: Final = 64 << 20
+MOST_IN_ALL: Final = 1 << 30
+MOST_OF_A_HEADER: Final = 4096
+MOST_MEMBERS: Final = 2000
+
+_GZIP: Final = b"\x1f\x8b"
+_CHUNK: Final = 1 << 20
+
+
+class _Forward:
+    """A stream that tarfile reads headers from: forward only, in small pieces, and not beyond a gigabyte."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        #: What was read last.
+        self.last = b""
+
+    def tell(self) -> int:
+        """The present place."""
+        return self._stream.tell()
+
+    def seek(self, place: int) -> int:
+        """Go forward to a place."""
+        if place < self.tell():
+            raise tarfile.ReadError("a member that leads back")
+        if place > MOST_IN_ALL:
+            raise tarfile.ReadError(f"more than {MOST_IN_ALL >> 20} MB unpacked")
+        return self._stream.seek(place)
+
+    def read(self, size: int) -> bytes:
+        """Part of a header."""
+        if not 0 <= size <= MOST_OF_A_HEADER:
+            raise tarfile.ReadError(f"a header of {size} bytes")
+        self.last = self._stream.read(size)
+        return self.last
+
+    def content(self, member: tarfile.TarInfo) -> bytes:
+        """A member's bytes, from where its header ends."""
+        data = self._stream.read(member.size)
+        if len(data) < member.size:
+            raise tarfile.ReadError("its end within a member")
+        return data
+
+    def finish(self) -> None:
+        """Read to the end, where gzip has its checksum."""
+        if self.last != bytes(tarfile.BLOCKSIZE):
+            raise tarfile.ReadError("no end of an archive")
+        while self._stream.read(_CHUNK):
+            self.seek(self.tell())
+
+
+def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePosixPath, bytes], list[str]]:
+    """Read the wanted files of a tar archive, plain or through gzip.
+
+    Args:
+        archive: Its path.
+        wanted: Says of a file's name, without folders, whether to read it.
+
+    Returns:
+        The files' bytes by their paths, and wanted members that were left out, in words: links, and paths that lead
+        out of the archive.
+
+    Raises:
+        ArtefactError: It cannot be read, is damaged or cut off, or holds more than the study can.
+    """
+    found: dict[PurePosixPath, bytes] = {}
+    lost = []
+    try:
+        with ExitStack() as stack:
+            stream = _Forward(_opened(archive, stack))
+            for member in _members(stream):
+                path = PurePosixPath(member.name)
+                if member.size > MOST_OF_A_FILE:
+                    raise tarfile.ReadError(f"{member.name!r} with more than {MOST_OF_A_FILE >> 20} MB")
+                if not wanted(path.name) or member.isdir():
+                    continue
+                if not member.isreg() or member.issparse() or path.is_absolute() or ".." in path.parts:
+                    lost.append(f"{archive}: {member.name!r} is a link or device, or leads out of it; left out")
+                    continue
+                found[path] = stream.content(member)
+            stream.finish()
+    except (tarfile.TarError, EOFError, OSError, zlib.error, ValueError, RecursionError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise ArtefactError(
+            f"{archive}: expected a whole tar archive of the study (runs.tar.gz), found {reason}; fetch it anew, or "
+            "name the folder into which it was unpacked"
+        ) from error
+    return found, lost
+
+
+def _opened(archive: Path, stack: ExitStack) -> IO[bytes]:
+    """The archive's bytes, unpacked."""
+    file = stack.enter_context(archive.open("rb"))
+    packed = file.read(len(_GZIP)) == _GZIP
+    file.seek(0)
+    return cast("IO[bytes]", stack.enter_context(gzip.GzipFile(fileobj=file))) if packed else file
+
+
+def _members(stream: _Forward) -> Iterator[tarfile.TarInfo]:
+    """Headers one after the other."""
+    with tarfile.open(fileobj=cast("IO[bytes]", stream), mode="r:") as tar:
+        for number, member in enumerate(tar):
+            if number >= MOST_MEMBERS:
+                raise tarfile.ReadError(f"more than {MOST_MEMBERS} members")
+            yield member

@@ -1,0 +1,142 @@
+"""What the study's classes hold, field by field, checked."""
+
+from collections.abc import Mapping
+from itertools import chain
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navirl_cli.demos.grid import MAX_RESOLUTION_M, MIN_RESOLUTION_M
+from navirl_cli.logs.recording import Occupancy
+from navirl_cli.published.numbers import unpacked
+from navirl_cli.published.pickled import Kept
+
+#: More than this nobody drove in a hallway: pairs in one list, cells of one map, cells away from its origin.
+MOST_ROWS: Final = 100_000
+MOST_CELLS: Final = 1_000_000
+FARTHEST_CELL: Final = 100_000
+
+
+def state_of(value: Any, kind: str) -> Mapping[Any, Any]:
+    """The attributes of an object of one of the study's classes.
+
+    Args:
+        value: What `read_pickle` gave.
+        kind: The class's name without its module.
+
+    Raises:
+        ValueError: It is something else; in the words of a message.
+    """
+    if type(value) is not Kept or value.name.rpartition(".")[2] != kind or type(value.state) is not dict:
+        raise ValueError(f"expected {kind} with its attributes, found {_called(value)}")
+    return value.state
+
+
+def pairs_in(state: Mapping[Any, Any], name: str, kind: type[Any], expected: str, *, least: int = 0) -> NDArray[Any]:
+    """(n, 2) float64 or int64: a list of pairs of numbers.
+
+    Args:
+        state: Attributes of an object.
+        name: Of the attribute.
+        kind: `float`, which takes whole numbers too, or `int`.
+        expected: What it should be, for messages.
+        least: Fewest pairs.
+
+    Raises:
+        ValueError: It is something else; in the words of a message.
+    """
+    if name not in state:
+        raise ValueError(f"{name}: expected {expected}, found none")
+    try:
+        pairs = _pairs(state[name], {int, kind}, expected)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
+    if len(pairs) < least:
+        raise ValueError(f"{name}: expected {expected}, found {len(pairs)}")
+    if kind is int and any(abs(number) > FARTHEST_CELL for number in chain.from_iterable(pairs)):
+        raise ValueError(f"{name}: expected {expected}, found a number beyond {FARTHEST_CELL}")
+    return np.array(pairs, dtype=kind).reshape(-1, 2)
+
+
+def _pairs(value: Any, kinds: set[type[Any]], expected: str) -> list[list[Any]]:
+    """A list of pairs of numbers of some types."""
+    rows = _items(value)
+    if rows is None or len(rows) > MOST_ROWS:
+        raise ValueError(f"expected {expected}, found {_called(value) if rows is None else f'{len(rows)} of them'}")
+    pairs = []
+    for place, row in enumerate(rows):
+        pair = [unpacked(number) for number in _items(row) or ()]
+        if len(pair) != 2 or not {type(number) for number in pair} <= kinds:
+            raise ValueError(f"expected {expected}, found something else at place {place}")
+        pairs.append(pair)
+    return pairs
+
+
+def occupancy_in(nav_map: Any) -> Occupancy:
+    """The map that the study's class keeps, a nav_msgs/OccupancyGrid.
+
+    Raises:
+        ValueError: It is something else; in the words of a message.
+    """
+    message = state_of(nav_map, "NavMap").get("ros_occupancy_map")
+    try:
+        _, info, data = _slots(message, "OccupancyGrid", 3)
+        _, said, width, height, origin = _slots(info, "MapMetaData", 5)
+        position, turned = _slots(origin, "Pose", 2)
+        resolution, *place = (_number(value) for value in (said, *_slots(position, "Point", 3)))
+        quaternion = [_number(value) for value in _slots(turned, "Quaternion", 4)]
+        cells = _cells(data, width, height)
+    except ValueError as error:
+        raise ValueError(f"ros_occupancy_map: {error}") from error
+    if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M or not np.isfinite(place).all():
+        raise ValueError(
+            f"ros_occupancy_map: expected cells of {MIN_RESOLUTION_M} to {MAX_RESOLUTION_M} m and a finite origin, "
+            f"found {resolution:g} m and {place}"
+        )
+    if any(quaternion[:3]):
+        raise ValueError("ros_occupancy_map: expected cells along the axes of the map's frame, found them turned")
+    # a float32 of 0.1 is 0.10000000149 as a double: the shortest decimal is what was meant
+    return Occupancy(cells, float(str(np.float32(resolution))), (place[0], place[1]))
+
+
+def _cells(data: Any, width: Any, height: Any) -> NDArray[np.int8]:
+    """(height, width) occupancy."""
+    values, sides = _items(data), (width, height)
+    if values is None or not all(type(side) is int and side > 0 for side in sides) or width * height != len(values):
+        found = _called(data) if values is None else f"{len(values)} cells"
+        raise ValueError(f"expected a map of {_called(width)} x {_called(height)} cells, found {found}")
+    if not {type(value) for value in values} <= {int} or not all(-1 <= value <= 100 for value in values):
+        raise ValueError("expected occupancy from -1 to 100, found something else")
+    return np.array(values, dtype=np.int8).reshape(height, width)
+
+
+def _slots(value: Any, kind: str, count: int) -> list[Any] | tuple[Any, ...]:
+    """The fields of a message, which genpy keeps as a list in the order of the definition."""
+    state = value.state if type(value) is Kept and value.name.rpartition(".")[2] == kind else None
+    if not isinstance(state, list | tuple) or len(state) != count:
+        raise ValueError(f"expected {kind} of {count} fields, found {_called(value)}")
+    return state
+
+
+def _items(value: Any) -> list[Any] | tuple[Any, ...] | None:
+    """What a list, a tuple or an array holds; None for anything else."""
+    found = unpacked(value)
+    if isinstance(found, np.ndarray):
+        return list(found.tolist()) if found.ndim and found.size <= MOST_CELLS else None
+    return found if isinstance(found, list | tuple) else None
+
+
+def _number(value: Any) -> float:
+    """A number, as a float."""
+    number = unpacked(value)
+    if type(number) not in {int, float}:
+        raise ValueError(f"expected a number, found {_called(number)}")
+    return float(number)
+
+
+def _called(value: Any) -> str:
+    """A value for a message: what holds others may be too long to write out."""
+    if type(value) is Kept:
+        return value.name
+    return repr(value) if value is None or type(value) in {int, float} else f"a {type(value).__name__}"
