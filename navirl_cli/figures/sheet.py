@@ -1,10 +1,12 @@
 """Sheets of paper: figures opened without a display, and saved whole or not at all."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import BytesIO
+from math import ceil
 from pathlib import Path
 from types import MappingProxyType
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -12,6 +14,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.legend import Legend
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, DPI, house_style
@@ -32,23 +35,72 @@ _MOST_TRIMS = 10
 
 @house_style()
 def new_figure(
-    width_in: float = COLUMN_IN, height_in: float | None = None, panels: int = 1
+    width_in: float = COLUMN_IN, height_in: float | None = None, panels: int = 1, columns: int | None = None
 ) -> tuple[Figure, list[Axes]]:
-    """Open a figure with panels side by side.
+    """Open a figure with panels side by side, or in rows.
 
     Args:
         width_in: Width, inches; COLUMN_IN or PAGE_IN for a paper.
         height_in: Height, inches; None leaves as much as maps need, :func:`save_figure` takes away what is empty.
         panels: Number of panels.
+        columns: Panels in a row, the last of which may be short of some; None puts all in one.
 
     Returns:
-        The figure and its axes, from left to right.
+        The figure and its axes, row by row from left to right.
     """
-    height_in = width_in / panels * 1.3 + 1.0 if height_in is None else height_in
-    layout = ConstrainedLayoutEngine(w_pad=PAD_IN, h_pad=PAD_IN, wspace=0.03)
+    columns = panels if columns is None else columns
+    rows = ceil(panels / columns)
+    height_in = rows * (width_in / columns * 1.3) + 1.0 if height_in is None else height_in
+    layout = ConstrainedLayoutEngine(w_pad=PAD_IN, h_pad=PAD_IN, wspace=0.03, hspace=0.0)
     figure = Figure(figsize=(width_in, height_in), layout=layout)
-    axes = figure.subplots(1, panels, squeeze=False)
-    return figure, list(axes[0])
+    grid = figure.add_gridspec(rows, columns)
+    return figure, [figure.add_subplot(grid[divmod(panel, columns)]) for panel in range(panels)]
+
+
+def outer_labels(axes: Sequence[Axes]) -> None:
+    """Leave only the outermost of panels that show the same with labels and numbers on their axes.
+
+    Args:
+        axes: Row by row, as :func:`new_figure` gives them.
+    """
+    spec = axes[0].get_subplotspec()
+    columns = 1 if spec is None else spec.get_gridspec().ncols
+    for number, panel in enumerate(axes):
+        if (number // columns + 2) * columns <= len(axes):  # a full row stands below
+            panel.set_xlabel("")
+            panel.tick_params(labelbottom=False)
+        if number % columns:
+            panel.set_ylabel("")
+            panel.tick_params(labelleft=False)
+
+
+@house_style()
+def common_legend(axes: Sequence[Axes], handles: Sequence[Artist]) -> Legend:
+    """Put one legend where the last row of panels has a free place, or below them all.
+
+    Below, it is read row by row, in as many columns as fit.
+
+    Args:
+        axes: All panels of a figure, row by row, as :func:`new_figure` gives them.
+        handles: The entries.
+
+    Returns:
+        The legend.
+    """
+    figure, spec = axes[0].figure, axes[0].get_subplotspec()
+    if spec is not None and spec.get_gridspec().nrows * spec.get_gridspec().ncols > len(axes):
+        place = figure.add_subplot(spec.get_gridspec()[-1, -1])
+        place.set_axis_off()
+        return place.legend(handles=handles, loc="center")
+    for rows in range(1, len(handles) + 1):
+        columns = ceil(len(handles) / rows)
+        # matplotlib fills column by column
+        ordered = [handle for column in range(columns) for handle in handles[column::columns]]
+        legend = figure.legend(handles=ordered, loc="outside lower center", ncols=columns)
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
+    return legend
 
 
 @house_style()
@@ -58,13 +110,44 @@ def trim_height(figure: Figure) -> None:
     Args:
         figure: Changed in place. Panels that fill their height keep it.
     """
+    layout = figure.get_layout_engine()
     for _ in range(_MOST_TRIMS):
-        figure.draw_without_rendering()
-        width, height = figure.get_size_inches()
-        empty = float(height) - figure.get_tightbbox().height - 2 * PAD_IN
+        if layout is not None:
+            layout.execute(figure)
+        width, height = map(float, figure.get_size_inches())
+        empty = height - _filled_in(figure)
         if empty <= SLACK_IN:
             return
         figure.set_size_inches(width, height - empty + SLACK_IN / 2)
+
+
+def _filled_in(figure: Figure) -> float:
+    """Height that panels and legends take, with the border around each row of them, inches."""
+    # a legend in a free place fills less of it than its hidden axes
+    panels = (axes if axes.axison else axes.get_legend() for axes in figure.axes)
+    extents = [part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None]
+    touching = 2 * PAD_IN * figure.dpi  # rows may come that near before the layout has settled
+    rows: list[list[float]] = []
+    for y0, y1 in sorted((extent.y0, extent.y1) for extent in extents if extent is not None):
+        if rows and y0 < rows[-1][1] - touching:
+            rows[-1][1] = max(rows[-1][1], y1)
+        else:
+            rows.append([y0, y1])
+    return sum((y1 - y0) / figure.dpi + 2 * PAD_IN for y0, y1 in rows)
+
+
+@house_style()
+def settle(figure: Figure, *, trim: bool = True) -> None:
+    """Fix the layout, so that saving a figure in several formats works it out once.
+
+    Args:
+        figure: Changed in place.
+        trim: Take away empty height first, as :func:`trim_height`.
+    """
+    if trim:
+        trim_height(figure)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
 
 def check_target(path: Path, *, force: bool = False) -> str:

@@ -6,7 +6,10 @@ from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 
 from navirl_cli.demos.demonstration import Condition
 
@@ -23,7 +26,7 @@ INK = "#000000"
 OTHER_COLOUR = "#8C8C8C"
 
 #: Colours by key (Okabe and Ito, Color Universal Design: apart for every common kind of colour vision; force's cycles
-#: differ in lightness, so that grey print keeps them apart).
+#: differ in lightness, so that grey print keeps them apart). A replay has a darker shade of what it replays.
 COLOURS: Mapping[str, str] = MappingProxyType(
     {
         "force": "#0072B2",
@@ -33,12 +36,19 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "joystick": "#D55E00",
         "autonomous": "#009E73",
         "learnt": "#CC79A7",
+        "replay of the learnt policy": "#8F3A69",
+        "replay of the joystick": "#5A2300",
         "avoidance": "#E69F00",
+        "obstacle avoidance": "#E69F00",
         "driven": "#404040",
         "driven, on grid": "#7A7A7A",
         "nominal": "#BFBFBF",
     }
 )
+
+#: Colours of a scale from disagreement over neutral to agreement, and how far from the middle its ends lie: the dark
+#: end of agreement is the darker one, so that grey print keeps the two sides apart.
+_LEVELS_MAP, _LEVELS_FROM, _LEVELS_TO = "PuOr", 0.14, 0.95
 
 _STYLE: Mapping[Any, Any] = MappingProxyType(
     {
@@ -92,16 +102,31 @@ def colour_of(key: str) -> str:
 
     Args:
         key: A group as :func:`navirl_cli.evaluation.compare.group_of` names it, or a kind of path. Force's third and
-            later cycles share a colour, other conditions' cycles have their condition's; whatever is unknown is grey.
+            later cycles share a colour; other conditions' cycles, and special sets, have their condition's; whatever is
+            unknown is grey.
 
     Returns:
         The colour as #RRGGBB.
     """
-    if key in COLOURS:
-        return COLOURS[key]
-    group = key.split(", cycle ", maxsplit=1)[0]
-    later = group == Condition.FORCE and group != key
-    return COLOURS["force, later cycles"] if later else COLOURS.get(group, OTHER_COLOUR)
+    condition, *rest = key.split(", ")
+    if condition == Condition.FORCE and rest and rest[0].startswith("cycle "):
+        return COLOURS.get(f"{condition}, {rest[0]}", COLOURS["force, later cycles"])
+    return COLOURS.get(key, COLOURS.get(condition, OTHER_COLOUR))
+
+
+def level_colours(levels: int) -> list[str]:
+    """The colours of a scale's levels from "strongly disagree" to "strongly agree".
+
+    Args:
+        levels: Number of levels; an odd number has a neutral one in the middle, which is nearly white.
+
+    Returns:
+        Colours as #RRGGBB, orange to purple, apart for every common kind of colour vision and the darker the farther
+        from the middle; up to five differ in lightness.
+    """
+    aside = np.linspace(-1.0, 1.0, levels)
+    places = np.where(aside < 0, 0.5 + (0.5 - _LEVELS_FROM) * aside, 0.5 + (_LEVELS_TO - 0.5) * aside)
+    return [to_hex(colour) for colour in colormaps[_LEVELS_MAP](places)]
 
 
 def panel_width_in(axes: Axes) -> float:

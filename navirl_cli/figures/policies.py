@@ -1,0 +1,95 @@
+"""Propagated policy and state reward of one reward in several scenes, a row each (Figs. 8 and 9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from textwrap import fill
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.patches import Circle
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.errors import SceneError
+from navirl_cli.figures.cells import DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.ground import ground_handles
+from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
+from navirl_cli.figures.style import house_style, panel_width_in
+from navirl_cli.irl.scene import Scene
+
+#: A scene's title, the scene, its (n,) expected visits and its (n,) reward by cell.
+TitledScene = tuple[str, Scene, FloatArray, FloatArray]
+#: What the colour bars show.
+VISITS, REWARD = "expected visits", "state reward per step (without cost of way)"
+#: Mean width of a letter, of what stands beside a map, and thickness of a colour bar, inches.
+_LETTER_IN, _BESIDE_IN, _BAR_IN = 0.055, 0.35, 0.08
+#: Pointed ends of a colour bar, by whether cells lie below and above its range.
+_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+
+
+@dataclass(frozen=True)
+class DrawnPolicies:
+    """What :func:`draw_policy_and_reward` put on the axes, by scene."""
+
+    #: All share one colour bar.
+    policies: list[DrawnCells]
+    #: All share another.
+    rewards: list[DrawnCells]
+    legend: Legend
+
+
+@house_style()
+def draw_policy_and_reward(axes: Sequence[Axes], scenes: Sequence[TitledScene], robot_radius_m: float) -> DrawnPolicies:
+    """Draw where a policy leads and the reward that it follows side by side, a row for each scene.
+
+    Equal colours are equal numbers in all scenes: one colour bar stands above all policies and one above all rewards.
+
+    Args:
+        axes: Two for each scene in rows of two, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
+        scenes: Title, scene, (n,) expected visits by state from its start, and (n,) reward of a step in every state;
+            all under one reward.
+        robot_radius_m: Draws the robot at its start to scale, m.
+
+    Returns:
+        The artists.
+
+    Raises:
+        SceneError: There is no scene.
+        ValueError: There is not one number for each state.
+    """
+    if not scenes:
+        raise SceneError("no scene to draw")
+    policies, rewards = [], []
+    look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False}
+    for (title, scene, visits, reward), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
+        policies.append(draw_policy(left, scene, visits, **look))
+        rewards.append(draw_reward(right, scene, reward, window_m=policies[-1].window_m, **look))
+        # The title is the row's: it may reach over the panel on the right, which has none.
+        left.set_title(fill(title, int(2 * (panel_width_in(left) - _BESIDE_IN) / _LETTER_IN)), loc="left")
+    alike = len({drawn.window_m for drawn in policies}) == 1
+    for rows in [axes] if alike else [axes[at : at + 2] for at in range(0, len(axes), 2)]:
+        outer_labels(rows)
+    everybody = [person for drawn in policies for person in drawn.people]
+    robots = [Circle((0.0, 0.0), robot_radius_m)]
+    handles = ground_handles(everybody[:1], robots, nominal=True, filled=False)
+    return DrawnPolicies(_share(policies, VISITS), _share(rewards, REWARD), common_legend(axes, handles))
+
+
+def _share(drawn: Sequence[DrawnCells], label: str) -> list[DrawnCells]:
+    """Give equal numbers equal colours in all panels, and all one colour bar above them in place of one each."""
+    clims = [one.image.get_clim() for one in drawn]
+    low, high = min(clim[0] for clim in clims), max(clim[1] for clim in clims)
+    tables = [table for one in drawn if (table := one.image.get_array()) is not None]
+    ends = any(table.min() < low for table in tables), any(table.max() > high for table in tables)
+    first, panels, window = drawn[0].colour_bar, [one.axes for one in drawn], drawn[0].window_m
+    for one in drawn:
+        one.colour_bar.remove()
+        one.image.set_clim(low, high)
+    width_in = panel_width_in(panels[0])
+    height_in = len(drawn) * (width_in - _BESIDE_IN) * (window[3] - window[2]) / (window[1] - window[0])
+    place: dict[str, Any] = {"location": "top", "pad": PAD_IN / height_in, "aspect": width_in / _BAR_IN}
+    look: dict[str, Any] = {"extend": _EXTEND[ends], "extendfrac": 0.03, "format": first.formatter}
+    bar = panels[0].figure.colorbar(drawn[0].image, ax=panels, **place, **look)
+    bar.outline.set_linewidth(0.5)
+    bar.set_label(fill(label, int((width_in - _BESIDE_IN) / _LETTER_IN)), labelpad=4.0)
+    return [replace(one, colour_bar=bar) for one in drawn]

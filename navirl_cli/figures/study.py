@@ -1,0 +1,153 @@
+"""All figures of a study, from its numbers to files."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import SceneError
+from navirl_cli.evaluation.compare import by_group
+from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.figures import answers, properties, times
+from navirl_cli.figures.conditions import draw_path_panels
+from navirl_cli.figures.policies import draw_policy_and_reward
+from navirl_cli.figures.sheet import new_figure, save_figure, settle
+from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene, scenes_of
+from navirl_cli.parallel import map_in_order
+from navirl_cli.study.pipeline import Study
+from navirl_cli.study.questionnaire import Shares
+from navirl_cli.study.unseen import beside_obstacle, two_people
+
+#: Formats of every figure: for reports, and for papers.
+FORMATS = ("png", "pdf")
+#: A figure drawn, and whether empty height may be cut away.
+_Drawn = tuple[Figure, bool]
+
+
+def draw_study(
+    study: Study,
+    bars: Sequence[Shares],
+    folder: Path,
+    *,
+    force: bool,
+    progress: Callable[[int, str], None] | None = None,
+    executor: Executor | None = None,
+) -> tuple[dict[str, Path], list[str]]:
+    """Draw whatever the study's data allow.
+
+    Args:
+        study: The numbers.
+        bars: Answers to a questionnaire; none where there is none.
+        folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.study.text.FIGURES`.
+        force: Replace existing files.
+        progress: Called with the number of figures drawn and the name of the last.
+        executor: Where to draw; by default local processes.
+
+    Returns:
+        The .png file of each figure drawn, and what could not be drawn, in words.
+    """
+    notes: list[str] = []
+    wanted = _wanted(study, bars, notes)
+    paths = {}
+    for name in map_in_order(partial(_saved, folder=folder, force=force), list(wanted.items()), executor):
+        paths[name] = folder / f"{name}.png"
+        if progress is not None:
+            progress(len(paths), name)
+    return paths, notes
+
+
+def _saved(job: tuple[str, Callable[[], _Drawn]], folder: Path, *, force: bool) -> str:
+    """Draw one figure and save it in all formats."""
+    name, draw = job
+    figure, trim = draw()
+    settle(figure, trim=trim)
+    for extension in FORMATS:
+        save_figure(figure, folder / f"{name}.{extension}", force=force, trim=False)
+    return name
+
+
+def _wanted(study: Study, bars: Sequence[Shares], notes: list[str]) -> dict[str, Callable[[], _Drawn]]:
+    """The figures for which there are data."""
+    wanted: dict[str, Callable[[], _Drawn]] = {}
+    if study.completion_s:
+        wanted["fig2_completion_times"] = partial(_completion, study)
+    by_hand = {
+        name: own for name, own in by_group(study.demonstrations).items() if own[0].condition.value != "autonomous"
+    }
+    alone = {name: own for name, own in by_group(study.demonstrations).items() if name not in by_hand}
+    for name, groups in (("fig3_paths", by_hand), ("fig5_replays", alone)):
+        if groups:
+            wanted[name] = partial(_paths, list(groups.items()))
+    if bars:
+        wanted["fig4_answers"] = partial(_answers, bars)
+    if study.groups:
+        wanted["fig7_properties"] = partial(_properties, study)
+    if study.pooled.second is not None:
+        reward, one = study.pooled.second.fit.reward, study.seconds[0]
+        scene = scenes_of([one])[0]
+        wanted["fig8_pooled"] = partial(_policies, reward, [("scene of the study", scene)], one.robot_radius_m)
+        unseen = _unseen(scene, one, notes)
+        if unseen:
+            wanted["fig9_unseen"] = partial(_policies, reward, unseen, one.robot_radius_m)
+    return wanted
+
+
+def _unseen(scene: Scene, one: Demonstration, notes: list[str]) -> list[tuple[str, Scene]]:
+    """Scenes that nobody demonstrated in, where this hallway has room for them."""
+    found = []
+    for name, make in (
+        ("two people", two_people),
+        ("person beside a large obstacle", partial(beside_obstacle, robot_radius_m=one.robot_radius_m)),
+    ):
+        try:
+            found.append((name, make(scene)))
+        except SceneError as error:
+            notes.append(f"no unseen scene with {name}: {error}")
+    return found
+
+
+def _completion(study: Study) -> _Drawn:
+    figure, (axes,) = new_figure(COLUMN_IN, times.HEIGHT_IN)
+    every = {modality: [t for own in known.values() for t in own] for modality, known in study.completion_s.items()}
+    times.draw_completion_times(axes, every)
+    return figure, False
+
+
+def _paths(panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> _Drawn:
+    figure, axes = new_figure(PAGE_IN, panels=len(panels), columns=min(2, len(panels)))
+    draw_path_panels(axes, panels)
+    return figure, True
+
+
+def _answers(bars: Sequence[Shares]) -> _Drawn:
+    figure, (axes,) = new_figure(PAGE_IN, answers.height_for(bars, PAGE_IN))
+    answers.draw_answers(axes, bars)
+    return figure, False
+
+
+def _properties(study: Study) -> _Drawn:
+    bars = [
+        properties.PropertyBar(one.group, one.group, one.driven.mean, one.driven.std, one.driven.count)
+        for one in study.groups
+    ]
+    figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(METRICS))
+    properties.draw_properties(axes, bars)
+    return figure, False
+
+
+def _policies(reward: Reward, scenes: Sequence[tuple[str, Scene]], robot_radius_m: float) -> _Drawn:
+    rows = []
+    for name, scene in scenes:
+        start = np.zeros(scene.lattice.size)
+        start[scene.start] = 1.0
+        rows.append((name, scene, policy_of(reward, scene).visits(start), reward.by_cell(scene)))
+    figure, axes = new_figure(PAGE_IN, panels=2 * len(rows), columns=2)
+    draw_policy_and_reward(axes, rows, robot_radius_m)
+    return figure, True

@@ -1,0 +1,120 @@
+"""Completion times of the obstacle course by modality (Fig. 2)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.ticker import MaxNLocator
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
+
+#: What the figure says of itself.
+NOTE = "box: median and quartiles, whiskers: within 1.5 IQR, dots: all times"
+#: Height of the figure, inches.
+HEIGHT_IN = 2.3
+#: Greatest width of a box, in inches and in shares of the room that a modality has, which its dots fill at most.
+_BOX_IN, _BOXED, _DOTTED = 0.7, 0.6, 0.9
+#: Diameter of a dot, points; from dot to dot, inches, side by side, and in shares of the axis, one above the other.
+_DOT_PT, _BESIDE_IN, _ABOVE = 3.2, 0.055, 0.035
+#: How opaque a box is, so that its median stands out.
+_OPACITY = 0.55
+#: Width of a letter below the boxes and of what stands beside them, inches.
+_LETTER_IN, _AXIS_IN = 0.055, 0.45
+_LINE: dict[str, Any] = {"color": INK, "linewidth": 0.8}
+
+
+@dataclass(frozen=True)
+class DrawnTimes:
+    """What :func:`draw_completion_times` put on the axes, by modality."""
+
+    axes: Axes
+    boxes: list[PathPatch]
+    medians: list[Line2D]
+    #: Two for each modality, the lower one first.
+    whiskers: list[Line2D]
+    #: One marker for each time, from the shortest to the longest.
+    dots: list[Line2D]
+
+
+@house_style()
+def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) -> DrawnTimes:
+    """Draw completion times as box plots with every single time as a dot; dots that would hide each other part.
+
+    A box spans the quartiles, whiskers reach to the farthest times within 1.5 times its height (Tukey).
+
+    Args:
+        axes: Where to draw, HEIGHT_IN high or more with its labels.
+        times_s: Times by modality, s; modalities without a time are left out.
+
+    Returns:
+        The artists.
+
+    Raises:
+        DemonstrationError: There is no time, or one is not above 0.
+    """
+    times = {modality: np.sort(np.asarray(values, dtype=float)) for modality, values in times_s.items() if len(values)}
+    if not times:
+        raise DemonstrationError("no completion time to draw")
+    for modality, values in times.items():
+        if not (np.isfinite(values) & (values > 0)).all():
+            raise DemonstrationError(f"completion times of {modality}: need seconds above 0, found {values.tolist()}")
+    room_in = (panel_width_in(axes) - _AXIS_IN) / len(times)
+    box, line = {"edgecolor": INK, "linewidth": 0.8}, {**_LINE, "solid_capstyle": "butt"}
+    drawn = axes.boxplot(
+        list(times.values()),
+        positions=range(len(times)),
+        widths=min(_BOXED, _BOX_IN / room_in),
+        patch_artist=True,
+        showfliers=False,
+        manage_ticks=False,
+        boxprops=box,
+        whiskerprops=line,
+        capprops=line,
+        medianprops={**line, "linewidth": 2.0},
+    )
+    for patch, modality in zip(drawn["boxes"], times, strict=True):
+        patch.set_facecolor((colour_of(modality), _OPACITY))
+    highest = max(float(values[-1]) for values in times.values())
+    dots = [_dots(axes, at, values, highest, room_in) for at, values in enumerate(times.values())]
+    _label(axes, times, room_in)
+    axes.set_ylim(0.0, 1.06 * highest)
+    return DrawnTimes(axes, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
+
+
+def _dots(axes: Axes, at: int, times: FloatArray, highest: float, room_in: float) -> Line2D:
+    """All times of one modality, sorted, in the middle of it where nothing is in the way."""
+    ranks = _ranks(times, _ABOVE * highest)
+    beside = min(_BESIDE_IN / room_in, _DOTTED / max(1, int(np.ptp(ranks))))
+    look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 4}
+    (drawn,) = axes.plot(at + beside * ranks, times, linestyle="none", marker="o", markersize=_DOT_PT, **look)
+    return drawn
+
+
+def _ranks(times: FloatArray, near: float) -> FloatArray:
+    """(n,) places of sorted times to the sides of the middle: the nearest that no time closer than near has taken."""
+    places = [0, *(side * step for step in range(1, len(times)) for side in (1, -1))]
+    ranks: list[int] = []
+    for number, time in enumerate(times):
+        taken = {ranks[other] for other in range(number) if time - times[other] < near}
+        ranks.append(next(place for place in places if place not in taken))
+    return np.array(ranks, dtype=float)
+
+
+def _label(axes: Axes, times: Mapping[str, FloatArray], room_in: float) -> None:
+    """Name the axes and the modalities, these with their numbers of times."""
+    letters = max(1, int(room_in / _LETTER_IN))
+    names = [f"{fill(modality, letters)}\n(n = {len(values)})" for modality, values in times.items()]
+    axes.set_xticks(range(len(times)), names)
+    axes.set_xlim(-0.5, len(times) - 0.5)
+    axes.tick_params(axis="x", length=0)
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.set_ylabel("completion time [s]")
+    axes.set_xlabel(fill(NOTE, int(room_in * len(times) / _LETTER_IN)), fontsize="small")
+    axes.spines[["top", "right"]].set_visible(False)
