@@ -9,14 +9,16 @@ import click
 from navirl_cli import __version__
 from navirl_cli.errors import NavirlError
 
-#: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME; it is loaded when called, so
-#: that help and completion stay fast.
+#: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME (with _ for -); it is loaded
+#: when called, so that help and completion stay fast.
 COMMANDS = {
     "inspect": "Tell what logs hold, and what extract would make of it.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths.",
     "plot": "Draw paths, policy, reward or path properties.",
+    "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
+    "import-study": "Turn the published user study (RUNS) into logs.",
     "simulate": "Write simulated logs of people pushing a robot, with known truth.",
 }
 
@@ -32,7 +34,8 @@ class LazyGroup(click.Group):
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(f"navirl_cli.commands.{cmd_name}"), cmd_name)
+        name = cmd_name.replace("-", "_")
+        command: click.Command = getattr(import_module(f"navirl_cli.commands.{name}"), name)
         return command
 
     def resolve_command(

@@ -40,7 +40,8 @@ def log_with(tmp_path, name="run.mcap", **changes):
 def test_help_lists_each_command_as_it_describes_itself(navirl):
     text = navirl("--help").output
     for name, summary in COMMANDS.items():
-        command = getattr(import_module(f"navirl_cli.commands.{name}"), name)
+        module = name.replace("-", "_")
+        command = getattr(import_module(f"navirl_cli.commands.{module}"), module)
         assert command.get_short_help_str(200).rstrip(".") == summary.rstrip(".")
         assert summary in " ".join(text.split())
         assert command.help.split(".")[0] in " ".join(navirl(name, "--help").output.split())
@@ -76,7 +77,7 @@ def test_extract_prints_a_row_a_trial(navirl, tmp_path):
     header, row = result.stdout.splitlines()
     assert header.split("  ")[0] == "trial"
     *words, duration, length, cells, contacts, share, peak, impulse, direction = row.split()
-    assert words == ["run/1", "force", "-"]
+    assert words == ["run/1", "force", "-", "-"]
     assert (float(duration), float(length)) == pytest.approx((10.7, 4.0), abs=0.1)
     assert (cells, contacts) == ("41", "1")
     assert (float(share), float(peak), float(impulse)) == pytest.approx((19, 12.5, 24.0), abs=0.6)

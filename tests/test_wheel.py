@@ -23,5 +23,7 @@ def test_an_installed_wheel_goes_from_log_to_figure(tmp_path):
     run(navirl, "fit", "demos.json", "--cycle", "2", "-o", "reward.json")
     run(navirl, "evaluate", "demos.json", "--reward", "reward.json", "-o", "metrics.json")
     run(navirl, "plot", "policy", "demos.json", "--reward", "reward.json", "-o", "policy.pdf")
+    run(navirl, "study", ROOT / "sample_logs" / "p01.mcap", "-o", "study")
     run(navirl, "simulate", "-o", "logs", "--participants", "1")
     assert (tmp_path / "policy.pdf").read_bytes().startswith(b"%PDF")
+    assert "</html>" in (tmp_path / "study" / "report.html").read_text()

@@ -1,0 +1,199 @@
+"""What the paper says of its paths, asked of the participants at hand, in differences with intervals."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.study.learning import Learnt
+from navirl_cli.study.measures import LEAVES_M, Measured, by_participant, mean_and_spread
+
+SECOND_CYCLE, JOYSTICK, REPLAY = "force, cycle 2", "joystick", "replay of the learnt policy"
+#: Groups of a robot that only avoids obstacles: as an imported study calls them, and as a log that says no more.
+AVOIDANCE = ("obstacle avoidance", "autonomous")
+LEVEL = 0.95
+
+
+class Verdict(StrEnum):
+    """What the participants say of a claim."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    OPEN = "not settled"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A paired difference between two kinds of paths, over participants."""
+
+    what: str
+    unit: str
+    #: Mean over participants, and its interval from Student's t; NaN for a single one.
+    mean: float
+    lower: float
+    upper: float
+    #: By participant.
+    values: Mapping[str, float]
+    #: For closeness: standard deviation between the second cycle's paths, within which paths count as close.
+    margin: float | None = None
+
+    @property
+    def against(self) -> list[str]:
+        """Participants whose own difference speaks against the claim."""
+        if self.margin is None:
+            return [name for name, value in self.values.items() if value <= 0]
+        return [name for name, value in self.values.items() if abs(value) >= self.margin]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Close: the interval within the margin, or beyond it. Larger: the interval above 0, or below it."""
+        low, high = (0.0, np.inf) if self.margin is None else (-self.margin, self.margin)
+        if not np.isfinite([self.lower, self.upper]).all():
+            return Verdict.OPEN
+        if low < self.lower and self.upper < high:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.upper < low or self.lower > high else Verdict.OPEN
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim and what speaks for or against it."""
+
+    #: In a few words.
+    title: str
+    text: str
+    #: How it was asked.
+    asked: str
+    differences: tuple[Difference, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the differences' verdicts: failing before open before holding."""
+        verdicts = {difference.verdict for difference in self.differences}
+        return next(verdict for verdict in (Verdict.FAILS, Verdict.OPEN, Verdict.HOLDS) if verdict in verdicts)
+
+
+def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]:
+    """The paper's claims that the data at hand can be asked.
+
+    Args:
+        rows: Measured paths.
+        learnt: Fits by participant; a pooled one is passed over.
+    """
+    groups = {row.group for row in rows if np.isfinite(row.center_distance_m)}
+    avoidance = next((group for group in AVOIDANCE if group in groups), None)
+    claims = [
+        _replays(rows),
+        _expected(rows, learnt, own=True),
+        _expected(rows, learnt, own=False),
+        _joystick(rows),
+    ]
+    if avoidance is not None:
+        claims += [_latest(rows, avoidance), _smallest(rows, avoidance, sorted(groups - {avoidance}))]
+    return [claim for claim in claims if claim.differences]
+
+
+def paired(what: str, unit: str, one: Mapping[str, float], other: Mapping[str, float]) -> Difference | None:
+    """One less the other over the participants who have both; None where nobody has.
+
+    Args:
+        what: Of what.
+        unit: Of the values.
+        one: Values by participant.
+        other: Values by participant.
+    """
+    from scipy.stats import t
+
+    both = {name: one[name] - other[name] for name in one if name in other}
+    if not both:
+        return None
+    mean, spread = mean_and_spread(both.values())
+    several = len(both) > 1
+    half = float(t.ppf((1 + LEVEL) / 2, len(both) - 1) * spread / np.sqrt(len(both))) if several else float("nan")
+    return Difference(what, unit, mean, mean - half, mean + half, both)
+
+
+def _kept(differences: Sequence[Difference | None]) -> tuple[Difference, ...]:
+    return tuple(difference for difference in differences if difference is not None)
+
+
+def _metric(name: str, kind: str = "driven") -> Callable[[Measured], float]:
+    """A metric of a measured path."""
+    return lambda row: float(getattr(getattr(row, kind), name))
+
+
+def _close(rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]]) -> tuple[Difference, ...]:
+    """Each metric's values less the second cycle's, with the second cycle's own spread as the margin."""
+    found = []
+    for metric in METRICS:
+        value = _metric(metric.name, kind)
+        difference = paired(metric.label, metric.unit, one(metric.name), by_participant(rows, SECOND_CYCLE, value))
+        _, spread = mean_and_spread(value(row) for row in rows if row.group == SECOND_CYCLE)
+        if difference is not None:
+            found.append(replace(difference, margin=spread))
+    return tuple(found)
+
+
+def _replays(rows: Sequence[Measured]) -> Claim:
+    """Replays that the robot drove by itself."""
+    return Claim(
+        "replays",
+        "The learnt policy's paths are close to those of the second force cycle (replays that the robot drove).",
+        f"Replay of the learnt policy less {SECOND_CYCLE}, driven paths",
+        _close(rows, "driven", lambda name: by_participant(rows, REPLAY, _metric(name))),
+    )
+
+
+def _expected(rows: Sequence[Measured], learnt: Sequence[Learnt], *, own: bool) -> Claim:
+    """What the policies learnt from the second cycle, or from the first, expect in the second cycle's scenes."""
+    near = {}
+    for one in learnt:
+        of_cycle = one.second if own else one.first
+        if one.participant is not None and of_cycle is not None and of_cycle.near is not None:
+            near[one.participant] = of_cycle.near
+    differences = _close(
+        rows, "on_grid", lambda name: {who: float(getattr(one.expected, name)) for who, one in near.items()}
+    )
+    if own:
+        title = "learnt policies"
+        text = "The learnt policy's paths are close to those of the second force cycle (expected under the policy)."
+    else:
+        title = "foretold from cycle 1"
+        text = "What was learnt from the first cycle foretells the second cycle's paths."
+    return Claim(title, text, f"Expected under the policy less {SECOND_CYCLE}, paths through cells", differences)
+
+
+def _joystick(rows: Sequence[Measured]) -> Claim:
+    """Distances."""
+    distance = [by_participant(rows, group, lambda row: row.center_distance_m) for group in (JOYSTICK, SECOND_CYCLE)]
+    return Claim(
+        "joystick",
+        "Paths steered by joystick keep a larger distance to the person than paths of the second force cycle.",
+        f"Joystick less {SECOND_CYCLE}, driven paths",
+        _kept([paired("min. distance", "m", *distance)]),
+    )
+
+
+def _latest(rows: Sequence[Measured], avoidance: str) -> Claim:
+    """Where paths leave the nominal one."""
+    onset = [by_participant(rows, group, lambda row: row.onset_m) for group in (SECOND_CYCLE, avoidance)]
+    return Claim(
+        "late avoidance",
+        "Obstacle avoidance begins to give way later than people wish.",
+        f"Way left to the person when the path is {LEAVES_M:g} m off the nominal one: {SECOND_CYCLE} less {avoidance}",
+        _kept([paired("way left to the person", "m", *onset)]),
+    )
+
+
+def _smallest(rows: Sequence[Measured], avoidance: str, others: Sequence[str]) -> Claim:
+    """Areas under all paths."""
+    area = _metric("area_m2")
+    least = by_participant(rows, avoidance, area)
+    return Claim(
+        "smallest area",
+        "Paths of obstacle avoidance have the smallest area under the path.",
+        f"Each other group less {avoidance}, driven paths",
+        _kept([paired(f"area, {group}", "m²", by_participant(rows, group, area), least) for group in others]),
+    )

@@ -1,0 +1,104 @@
+"""The paper's evaluation from demonstrations to numbers."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.likelihood import log_likelihood
+from navirl_cli.irl.reward import Reward
+from navirl_cli.parallel import map_in_order
+from navirl_cli.study.claims import Claim, claims_of
+from navirl_cli.study.learning import SECOND, Learnt, is_of_cycle, jobs_of, learn
+from navirl_cli.study.measures import GroupProperties, Measured, groups_of, measured
+
+#: What the paper's authors learnt from the second cycles of their 13 participants, in SI units. Source: their published
+#: parameters c0 = -5.412586, a_g = -0.873514, a_p = -4.907188 and a width of 5.456288 cells, per cell of 0.1 m.
+PUBLISHED_THETA = {
+    "c0": -54.12585735321045,
+    "a_g": -0.8735144734382628,
+    "a_p": -4.90718793869,
+    "sigma_p": 1.679498831347,
+}
+PUBLISHED_PARTICIPANTS = 13
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that the report of a study tells."""
+
+    demonstrations: tuple[Demonstration, ...]
+    rows: tuple[Measured, ...]
+    groups: tuple[GroupProperties, ...]
+    #: By participant, in order of their logs.
+    participants: tuple[Learnt, ...]
+    pooled: Learnt
+    #: Log-likelihood of the second cycles of all under the published parameters, nats; None of another study.
+    published_log_likelihood: float | None
+    claims: tuple[Claim, ...]
+    #: Times in which the obstacle course was completed, s, by modality and participant.
+    completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]
+
+    @property
+    def seconds(self) -> list[Demonstration]:
+        """The demonstrations of all second cycles."""
+        return [one for one in self.demonstrations if is_of_cycle(one, SECOND)]
+
+
+def study_of(
+    demonstrations: Sequence[Demonstration],
+    completion_s: Mapping[str, Mapping[str, tuple[float, ...]]],
+    samples: int,
+    seed: int,
+    *,
+    published: bool = False,
+    progress: Callable[[int, str], None] | None = None,
+    executor: Executor | None = None,
+) -> Study:
+    """Evaluate a study.
+
+    Args:
+        demonstrations: Of all participants; those of the force condition need their cycle.
+        completion_s: Times in which the obstacle course was completed, s, by modality and participant.
+        samples: Paths to sample from every learnt policy in every scene.
+        seed: Of the sampling; the same seed gives the same numbers, whatever the number of processes.
+        published: Whether these are the published study's paths, so that its parameters can be compared.
+        progress: Called with the number of fits done and whose was the last.
+        executor: Where to run; by default local processes.
+
+    Raises:
+        DemonstrationError: There is no second cycle to learn from.
+        SceneError: A demonstration's scene has no way from start to goal.
+    """
+    if not any(is_of_cycle(one, SECOND) for one in demonstrations):
+        cycles = sorted({one.cycle for one in demonstrations if one.cycle is not None})
+        raise DemonstrationError(
+            f"a study needs trials of the condition force in cycle {SECOND}, found "
+            f"{f'cycles {cycles} only' if cycles else 'no cycles'}; say which trial is what in the logs' metadata "
+            "record navirl.session, as the README has it"
+        )
+    learnt: list[Learnt] = []
+    for one in map_in_order(learn, jobs_of(demonstrations, samples, seed), executor):
+        learnt.append(one)
+        if progress is not None:
+            progress(len(learnt), one.participant or "all")
+    participants, pooled = tuple(learnt[:-1]), learnt[-1]
+    rows = tuple(measured(demonstrations))
+    return Study(
+        demonstrations=tuple(demonstrations),
+        rows=rows,
+        groups=tuple(groups_of(demonstrations, rows)),
+        participants=participants,
+        pooled=pooled,
+        published_log_likelihood=_published_log_likelihood(demonstrations) if published else None,
+        claims=tuple(claims_of(rows, participants)),
+        completion_s=completion_s,
+    )
+
+
+def _published_log_likelihood(demonstrations: Sequence[Demonstration]) -> float:
+    """Of the second cycles of all, under the published parameters, nats."""
+    seconds = [one for one in demonstrations if is_of_cycle(one, SECOND)]
+    return log_likelihood(evidence_of(seconds), Reward.named(PUBLISHED_THETA))

@@ -1,0 +1,133 @@
+"""The tables of a study's report, as texts."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
+from statistics import median
+
+from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.document import Table
+from navirl_cli.study.claims import Claim
+from navirl_cli.study.learning import Closeness, CycleFit, Learnt
+from navirl_cli.study.measures import GroupProperties, mean_and_spread
+from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
+
+
+def claims_table(claims: Iterable[Claim]) -> Table:
+    """The differences that the verdicts rest on."""
+    rows = [
+        (
+            claim.title,
+            one.what,
+            signed(one.mean, one.unit),
+            f"{signed(one.lower)} to {signed(one.upper)}" if isfinite(one.lower) else "-",
+            str(len(one.values)),
+            "-" if one.margin is None else f"± {one.margin:.3f}",
+            ", ".join(one.against) or "-",
+            one.verdict.value,
+        )
+        for claim in claims
+        for one in claim.differences
+    ]
+    header = ("claim", "of", "mean difference", "95 % interval", "n", "close within", "not so for", "verdict")
+    return Table(header, tuple(rows), "Paired differences over participants.")
+
+
+def completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]) -> Table:
+    """Completion times by modality."""
+    rows = []
+    for modality, known in completion_s.items():
+        times = [time for own in known.values() for time in own]
+        rows.append((modality, str(len(times)), f"{median(times):.1f}", plus_minus(*mean_and_spread(times), 1)))
+    return Table(("modality", "n", "median s", "mean ± standard deviation s"), tuple(rows), "Completion times.")
+
+
+def properties_table(groups: Sequence[GroupProperties]) -> Table:
+    """Properties of driven paths by group."""
+    header = (
+        "paths",
+        "n",
+        *(f"{m.label} {m.unit}" for m in METRICS),
+        "distance of centres m",
+        "leaves before person m",
+    )
+    rows = []
+    for group in groups:
+        mean, std = group.driven.mean, group.driven.std
+        own = [plus_minus(getattr(mean, m.name), getattr(std, m.name), 3) for m in METRICS]
+        rest = [plus_minus(*values, 3) for values in (group.center_distance_m, group.onset_m)]
+        rows.append((group.group, str(group.driven.count), *own, *rest))
+    return Table(header, tuple(rows), "Driven paths, mean ± standard deviation over paths.")
+
+
+def rewards_table(study: Study) -> Table:
+    """Parameters by participant and cycle, pooled, and as published."""
+    parameters = Reward.named({}).parameters
+    header = ("learnt from", "n", *(f"{p.name} {p.unit}".strip() for p in parameters), "log-likelihood", "status")
+    rows = [
+        _fit_row(f"{_whose(learnt)}, {cycle}", found)
+        for learnt in (*study.participants, study.pooled)
+        for cycle, found in _cycles(learnt)
+    ]
+    if study.published_log_likelihood is not None:
+        values = [f"{PUBLISHED_THETA[parameter.name]:.4g}" for parameter in parameters]
+        name = f"published, {PUBLISHED_PARTICIPANTS} participants"
+        rows.append((name, "26", *values, f"{study.published_log_likelihood:.3f} of those here", "-"))
+    return Table(header, tuple(rows), "Parameters ± standard errors (observed information), metres throughout.")
+
+
+def closeness_table(study: Study) -> Table:
+    """Expected properties beside demonstrated ones."""
+    header = ("policy of", *(f"{m.label} {m.unit}: {which}" for m in METRICS for which in ("shown", "expected")))
+    rows = [
+        (f"{_whose(one)}, {cycle}", *_shown_and_expected(found.near))
+        for one in (*study.participants, study.pooled)
+        for cycle, found in _cycles(one)
+        if found.near is not None
+    ]
+    return Table(
+        header,
+        tuple(rows),
+        "Paths of the second cycle through the centres of their cells (mean ± standard deviation over paths), and "
+        "what the policy expects in their scenes (mean ± standard deviation of one path).",
+    )
+
+
+def signed(value: float, unit: str = "") -> str:
+    """A number with its sign."""
+    return f"{value:+.3f} {unit}".rstrip().replace("-", "\N{MINUS SIGN}")
+
+
+def plus_minus(mean: float, spread: float, decimals: int) -> str:
+    """A mean and its spread, where they are known."""
+    if not isfinite(mean):
+        return "-"
+    return f"{mean:.{decimals}f}" + (f" ± {spread:.{decimals}f}" if isfinite(spread) else "")
+
+
+def _whose(learnt: Learnt) -> str:
+    return "all" if learnt.participant is None else learnt.participant
+
+
+def _cycles(learnt: Learnt) -> list[tuple[str, CycleFit]]:
+    """The cycles that were learnt from."""
+    return [(name, one) for name, one in (("cycle 1", learnt.first), ("cycle 2", learnt.second)) if one is not None]
+
+
+def _fit_row(name: str, cycle: CycleFit) -> tuple[str, ...]:
+    fit = cycle.fit
+    values = [_with_error(v, e) for v, e in zip(fit.reward.theta, fit.standard_errors.tolist(), strict=True)]
+    return name, str(fit.demonstrations), *values, f"{fit.log_likelihood:.3f}", fit.status.value
+
+
+def _with_error(value: float, error: float) -> str:
+    """Four digits, and two of the standard error."""
+    return f"{value:.4g}" + (f" ± {error:.2g}" if isfinite(error) else "")
+
+
+def _shown_and_expected(near: Closeness) -> list[str]:
+    pairs = (
+        (near.demonstrated, near.demonstrated_spread),
+        (near.expected, near.spread),
+    )
+    return [plus_minus(getattr(mean, m.name), getattr(spread, m.name), 2) for m in METRICS for mean, spread in pairs]

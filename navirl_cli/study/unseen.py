@@ -1,0 +1,64 @@
+"""Scenes that nobody demonstrated in, made from one that somebody did (Fig. 9)."""
+
+import numpy as np
+
+from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.irl.scene import Scene
+
+#: Two people stand at these shares of the nominal path, this far to its left and to its right, m.
+SHARES, ASIDE_M = (0.35, 0.65), 0.4
+#: A large obstacle reaches this far along the nominal path, and from so far to its left on to the left, m.
+LONG_M, WIDE_M, OFF_M = 1.5, 1.0, 0.8
+#: The person beside it stands this far to the right of the nominal path, m.
+BESIDE_M = 0.5
+
+
+def two_people(scene: Scene) -> Scene:
+    """Two people in the scene's hallway, one on each side of the way.
+
+    Raises:
+        SceneError: No way is left.
+    """
+    places = [_beside(scene, share, side * ASIDE_M) for share, side in zip(SHARES, (1, -1), strict=True)]
+    return _scene(scene, scene.lattice.grid, np.array(places))
+
+
+def beside_obstacle(scene: Scene, robot_radius_m: float) -> Scene:
+    """A person on one side of the way and a large obstacle on the other.
+
+    Args:
+        scene: Gives the hallway.
+        robot_radius_m: The obstacle is grown by it, m.
+
+    Raises:
+        SceneError: No way is left.
+    """
+    grid = scene.lattice.grid
+    along, across = _axes(scene)
+    rows, columns = np.indices(grid.shape)
+    away = grid.centres_of(np.stack([columns, rows], axis=2)) - _beside(scene, 0.5, 0.0)
+    forward, left = np.abs(away @ along), away @ across
+    block = (forward <= LONG_M / 2) & (left >= OFF_M) & (left <= OFF_M + WIDE_M)
+    grown = Grid(block, grid.resolution_m, grid.origin_m).inflated(robot_radius_m)
+    blocked = Grid(grid.occupied | grown.occupied, grid.resolution_m, grid.origin_m)
+    return _scene(scene, blocked, _beside(scene, 0.5, -BESIDE_M)[None])
+
+
+def _axes(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors from start to goal, and to the left of it."""
+    ahead = scene.lattice.xy_m[scene.goal] - scene.lattice.xy_m[scene.start]
+    along: FloatArray = ahead / np.hypot(*ahead)
+    return along, np.array([-along[1], along[0]])
+
+
+def _beside(scene: Scene, share: float, left_m: float) -> FloatArray:
+    """(2,) m: a place beside the straight way from start to goal."""
+    start, goal = scene.lattice.xy_m[[scene.start, scene.goal]]
+    place: FloatArray = start + share * (goal - start) + left_m * _axes(scene)[1]
+    return place
+
+
+def _scene(scene: Scene, grid: Grid, people_m: FloatArray) -> Scene:
+    """The same start and goal among other people and obstacles."""
+    start, goal = scene.lattice.cells[[scene.start, scene.goal]]
+    return Scene.on(grid, start, goal, people_m)

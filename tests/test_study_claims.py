@@ -1,0 +1,154 @@
+"""What participants say of the paper's claims, on numbers whose answers are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from navirl_cli.evaluation.metrics import PathMetrics
+from navirl_cli.study.claims import Claim, Difference, Verdict, claims_of, paired
+from navirl_cli.study.measures import Measured
+
+FORCE, JOYSTICK, REPLAY, AVOIDANCE = "force, cycle 2", "joystick", "replay of the learnt policy", "obstacle avoidance"
+
+
+def row(participant, group, length=6.8, distance=0.7, area=2.4, onset=2.0, on_grid=None):
+    driven = PathMetrics(length, distance - 0.4, area)
+    return Measured("", participant, group, driven, on_grid or driven, distance, onset)
+
+
+def difference(lower, upper, margin=None):
+    return Difference("", "m", (lower + upper) / 2, lower, upper, {"a": 0.1, "b": -0.2, "c": 0.0}, margin)
+
+
+def titled(claims, title):
+    (found,) = [claim for claim in claims if claim.title == title]
+    return found
+
+
+def test_differences_are_paired_with_students_interval():
+    one, other = {"a": 1.0, "b": 2.5, "c": 4.0, "x": 9.0}, {"c": 3.0, "a": 0.5, "b": 2.75, "y": 1.0}
+    found = paired("length", "m", one, other)
+    values = np.array([0.5, -0.25, 1.0])
+    low, high = stats.t.interval(0.95, 2, values.mean(), stats.sem(values))
+    assert (found.mean, found.lower, found.upper) == pytest.approx((values.mean(), low, high))
+    assert found.values == pytest.approx({"a": 0.5, "b": -0.25, "c": 1.0})
+    assert found.against == ["b"]
+    assert paired("length", "m", {"a": 1.0}, {"b": 1.0}) is None
+
+
+def test_one_participant_settles_nothing():
+    found = paired("length", "m", {"a": 2.0}, {"a": 1.0})
+    assert (found.mean, found.verdict) == (1.0, Verdict.OPEN)
+    assert np.isnan([found.lower, found.upper]).all()
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "margin", "verdict"),
+    [
+        (0.1, 0.5, None, Verdict.HOLDS),
+        (-0.1, 0.5, None, Verdict.OPEN),
+        (-0.5, -0.1, None, Verdict.FAILS),
+        (-0.1, 0.2, 0.3, Verdict.HOLDS),
+        (-0.1, 0.4, 0.3, Verdict.OPEN),
+        (-0.4, -0.1, 0.3, Verdict.OPEN),
+        (0.31, 0.5, 0.3, Verdict.FAILS),
+        (-0.5, -0.31, 0.3, Verdict.FAILS),
+        (-1.0, 1.0, 0.3, Verdict.OPEN),
+    ],
+)
+def test_a_verdict_is_where_the_interval_lies(lower, upper, margin, verdict):
+    assert difference(lower, upper, margin).verdict is verdict
+
+
+def test_who_speaks_against_a_claim_is_named():
+    assert difference(0.1, 0.2).against == ["b", "c"]
+    assert difference(0.1, 0.2, margin=0.15).against == ["b"]
+
+
+def test_a_claim_is_as_good_as_its_worst_difference():
+    good, open_, bad = difference(0.1, 0.2), difference(-0.1, 0.2), difference(-0.2, -0.1)
+    assert Claim("", "", "", (good, good)).verdict is Verdict.HOLDS
+    assert Claim("", "", "", (good, open_)).verdict is Verdict.OPEN
+    assert Claim("", "", "", (open_, bad, good)).verdict is Verdict.FAILS
+
+
+def study(participants=13, seed=0, **shift):
+    """Rows of a made-up study; a shift moves what the groups differ by."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for number in range(participants):
+        name, own = f"p{number}", rng.normal(0, 0.1)
+        for _ in range(2):
+            rows.append(
+                row(
+                    name,
+                    FORCE,
+                    length=6.8 + rng.normal(0, 0.1),
+                    distance=0.7 + own + rng.normal(0, 0.02),
+                    area=2.4 + rng.normal(0, 0.2),
+                )
+            )
+            rows.append(row(name, JOYSTICK, distance=0.7 + own + shift.get("joystick", 0.2) + rng.normal(0, 0.02)))
+        replayed = 0.7 + own + shift.get("replay", 0.0) + rng.normal(0, 0.02)
+        rows.append(row(name, REPLAY, distance=replayed, area=2.4 + rng.normal(0, 0.05)))
+        late = {
+            "area": shift.get("area", 0.8) + rng.normal(0, 0.02),
+            "onset": shift.get("onset", 0.6) + rng.normal(0, 0.1),
+        }
+        rows.append(row(name, AVOIDANCE, **late))
+    return rows
+
+
+def test_claims_hold_where_the_numbers_say_so():
+    claims = claims_of(study(), [])
+    assert [claim.title for claim in claims] == ["replays", "joystick", "late avoidance", "smallest area"]
+    verdicts = {claim.title: claim.verdict for claim in claims}
+    assert set(verdicts.values()) == {Verdict.HOLDS}
+    assert [one.margin is None for one in titled(claims, "replays").differences] == [False] * 3
+    (joystick,) = titled(claims, "joystick").differences
+    assert joystick.mean == pytest.approx(0.2, abs=0.02)
+    assert (len(joystick.values), joystick.against) == (13, [])
+
+
+@pytest.mark.parametrize(
+    ("shift", "title"),
+    [({"joystick": -0.2}, "joystick"), ({"onset": 3.0}, "late avoidance"), ({"area": 3.0}, "smallest area")],
+)
+def test_claims_fail_where_the_numbers_say_so(shift, title):
+    assert titled(claims_of(study(**shift), []), title).verdict is Verdict.FAILS
+
+
+def test_replays_that_are_far_are_not_close():
+    replays = titled(claims_of(study(replay=0.5), []), "replays")
+    assert replays.differences[1].verdict is Verdict.FAILS
+
+
+def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
+    rows = [row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.onset_m) for one in study()]
+    assert "less autonomous" in titled(claims_of(rows, []), "late avoidance").asked
+
+
+def test_claims_without_data_are_left_out():
+    rows = [one for one in study() if one.group == FORCE]
+    assert claims_of(rows, []) == []
+
+
+def near(expected):
+    return SimpleNamespace(near=SimpleNamespace(expected=PathMetrics(*expected)))
+
+
+def test_expected_paths_are_held_against_those_on_the_grid():
+    shown = PathMetrics(7.0, 0.3, 2.0)
+    rows = [
+        row(f"p{k}", FORCE, length=9.9, on_grid=PathMetrics(7.0 + s, 0.3, 2.0)) for k in range(3) for s in (-0.1, 0.1)
+    ]
+    learnt = [SimpleNamespace(participant=f"p{k}", first=None, second=near((7.02, 0.3, 2.0))) for k in range(3)]
+    learnt.append(SimpleNamespace(participant=None, first=near((99, 99, 99)), second=near((99, 99, 99))))
+    claims = claims_of(rows, learnt)
+    assert [claim.title for claim in claims] == ["learnt policies"]
+    length = claims[0].differences[0]
+    assert length.mean == pytest.approx(0.02)
+    assert length.margin == pytest.approx(np.std([-0.1, 0.1] * 3, ddof=1))
+    assert shown.length_m + length.mean == pytest.approx(7.02)

@@ -1,0 +1,159 @@
+"""``navirl study`` on the sample logs: what is written, and that all of it says the same."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from robot_log import Run, write_run
+
+from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.artefacts.store import read_json
+from navirl_cli.cli import cli
+from navirl_cli.evaluation.compare import DRIVEN, compare
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.reward import Reward
+from navirl_cli.study.text import FIGURES
+
+LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
+ANSWERS = "participant,question,modality,answer\n" + "".join(
+    f"p{k:02d},The robot was easy to guide,{modality},{1 + (k + shift) % 5}\n"
+    for k in range(1, 7)
+    for shift, modality in enumerate(("force", "joystick"))
+)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The folder of a study, and what the command said."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "answers.csv").write_text(ANSWERS)
+    out = folder / "out"
+    words = ["study", *LOGS, "-o", out, "--samples", 200, "--questionnaire", folder / "answers.csv"]
+    result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return out, result
+
+
+@pytest.fixture(scope="module")
+def summary(written):
+    return read_json(written[0] / "summary.json", "study")
+
+
+@pytest.fixture(scope="module")
+def demos(written):
+    return read_demonstrations(written[0] / "demos.json")
+
+
+def test_all_is_written_and_no_more(written):
+    out, _ = written
+    figures = {name for name in FIGURES if name != "fig2_completion_times"}  # the sample logs hold no obstacle course
+    expected = {"report.md", "report.html", "summary.json", "demos.json", "figures"}
+    expected |= {f"figures/{name}.{extension}" for name in figures for extension in ("png", "pdf")}
+    assert {str(path.relative_to(out)) for path in out.rglob("*")} == expected
+
+
+def test_participants_are_fitted_cycle_by_cycle(summary, demos):
+    for name in ("p01", "p02", "p03"):
+        own = [one for one in demos if one.participant == name]
+        first = fit(evidence_of([one for one in own if one.cycle == 1]), Reward.named({}))
+        second = fit(evidence_of([one for one in own if one.cycle == 2]), first.reward)
+        found = summary["participants"][name]
+        for fitted, told in ((first, found["first_cycle"]), (second, found)):
+            assert list(told["theta"].values()) == pytest.approx(fitted.reward.theta, rel=1e-4)
+            assert list(told["standard_errors"].values()) == pytest.approx(fitted.standard_errors, rel=1e-2)
+            assert told["log_likelihood"] == pytest.approx(fitted.log_likelihood, abs=1e-4)
+            assert told["status"] == fitted.status.value
+
+
+def test_the_pooled_fit_is_that_of_all_second_cycles(summary, demos):
+    fitted = fit(evidence_of([one for one in demos if one.cycle == 2]), Reward.named({}))
+    assert summary["pooled"]["theta"]["a_p"] == pytest.approx(fitted.reward.theta[2], rel=1e-4)
+    assert summary["pooled"]["log_likelihood"] == pytest.approx(fitted.log_likelihood, abs=1e-4)
+    assert summary["pooled"]["first_cycle"]["theta"] is None
+    assert summary["pooled"]["demonstrations"] == 6
+
+
+def test_metrics_by_condition_are_those_of_evaluate(summary, demos):
+    rows = {row.group: row for row in compare(demos, None, 0, None).groups if row.kind == DRIVEN}
+    assert set(summary["metrics"]) == set(rows) == {"force, cycle 1", "force, cycle 2", "joystick", "autonomous"}
+    for group, row in rows.items():
+        driven = summary["metrics"][group]["driven"]
+        for name in ("length_m", "min_distance_m", "area_m2"):
+            # demos.json rounds positions to a micrometre
+            assert driven[name]["mean"] == pytest.approx(getattr(row.mean, name), rel=1e-4)
+            assert driven[name]["standard_deviation"] == pytest.approx(getattr(row.std, name), rel=1e-3, abs=1e-6)
+        assert driven["min_center_distance_m"]["mean"] == pytest.approx(row.mean.min_distance_m + 0.3, rel=1e-4)
+
+
+def test_the_report_tells_the_summarys_numbers(written, summary):
+    out, result = written
+    page, text = (out / "report.html").read_text(), (out / "report.md").read_text()
+    for name in ("p01", "p02", "p03"):
+        told = summary["participants"][name]
+        for parameter, value in told["theta"].items():
+            shown = f"{value:.4g} ± {told['standard_errors'][parameter]:.2g}"
+            assert shown in text
+            assert shown in page
+            assert shown in result.stdout
+        assert f"{told['log_likelihood']:.3f}" in text
+    for group in summary["metrics"].values():
+        area = group["driven"]["area_m2"]
+        assert f"{area['mean']:.3f} ± {area['standard_deviation']:.3f}" in text
+    assert len(summary["claims"]) == 5
+    for claim in summary["claims"]:
+        assert claim["claim"] in text
+        assert f"{claim['verdict']}: {claim['claim']}" in result.stdout
+
+
+def test_the_report_shows_every_figure(written):
+    out, _ = written
+    linked = re.findall(r"!\[.*?\]\((.*?)\)", (out / "report.md").read_text())
+    assert sorted(linked) == sorted(f"figures/{path.name}" for path in (out / "figures").glob("*.png"))
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == len(linked)
+    assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
+
+
+@pytest.mark.slow
+def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
+    out, _ = written
+    words = [
+        "study",
+        *LOGS,
+        "-o",
+        tmp_path / "out",
+        "--samples",
+        200,
+        "--questionnaire",
+        out.parent / "answers.csv",
+        "--json",
+    ]
+    result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
+    for path in out.rglob("*"):
+        if path.is_file():
+            assert (tmp_path / "out" / path.relative_to(out)).read_bytes() == path.read_bytes(), path
+    told, summary = json.loads(result.stdout), json.loads((out / "summary.json").read_text())
+    assert told == {key: value for key, value in summary.items() if key not in {"format", "version", "navirl"}}
+
+
+def test_nothing_is_replaced_unasked(navirl, written):
+    out, _ = written
+    result = navirl("study", *LOGS, "-o", out, code=1)
+    assert "exists already; give another name, or --force to replace it" in result.stderr
+
+
+def test_logs_without_cycles_are_refused(navirl, tmp_path):
+    log = write_run(tmp_path / "run.mcap", Run(wrench_topics=()))
+    result = navirl("study", log, "-o", "out", code=1)
+    assert "navirl: a study needs trials of the condition force in cycle 2, found no cycles" in result.stderr
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+def test_a_bad_questionnaire_is_told_before_the_work(navirl, tmp_path):
+    (tmp_path / "answers.csv").write_text("who,what\nann,yes\n")
+    result = navirl("study", *LOGS, "-o", "out", "--questionnaire", "answers.csv", code=1)
+    assert "answers.csv" in result.stderr
+    assert not (tmp_path / "out").exists()
