@@ -1,0 +1,128 @@
+"""Properties of a policy's paths: of drawn ones, all at once, and expected values where visits give them exactly."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.demos.grid import MOVES, FloatArray, IntArray
+from navirl_cli.evaluation.segments import ZONES, Segments, segments
+from navirl_cli.irl.lattice import Lattice
+from navirl_cli.irl.paths import SampledPaths
+from navirl_cli.irl.values import Policy
+
+#: (8, 8) rad, the change of direction from one move to another.
+_TURN = np.abs(np.angle(np.exp(1j * (np.arctan2(*MOVES.T[::-1])[None] - np.arctan2(*MOVES.T[::-1])[:, None]))))
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What every step of a lattice adds to a path's properties."""
+
+    lattice: Lattice
+    #: Arrays of shape (n, 8); steps that are not possible hold no meaning.
+    segments: Segments
+
+    @staticmethod
+    def of(lattice: Lattice, people_m: FloatArray, robot_radius_m: float) -> "Steps":
+        """Measure all steps.
+
+        Args:
+            lattice: The states.
+            people_m: (p, 2) m.
+            robot_radius_m: Taken off distances, m.
+        """
+        start = np.broadcast_to(lattice.xy_m[:, None], (lattice.size, 8, 2))
+        end = start + MOVES * lattice.grid.resolution_m
+        return Steps(lattice, segments(start, end, people_m, robot_radius_m))
+
+    def expected(self, policy: Policy, start: int) -> dict[str, float]:
+        """Exact expected values of what adds up along a path.
+
+        Args:
+            policy: On the same lattice.
+            start: State in which paths start.
+
+        Returns:
+            length_m, heading_rad, and the way in each zone, as NAME_m.
+        """
+        flow = policy.visits(np.eye(1, self.lattice.size, start)[0])[:, None] * policy.probability
+        found = {"length_m": float((flow * self.lattice.step_m).sum())}
+        for number, (name, _) in enumerate(ZONES):
+            found[f"{name}_m"] = float((flow * self.segments.zones_m[..., number]).sum())
+        # The next move is drawn in the state where this one ends; none is in the goal.
+        turns = policy.probability @ _TURN.T
+        possible = flow > 0
+        after = np.where(possible, self.lattice.neighbours, 0)
+        found["heading_rad"] = float(
+            (flow * np.take_along_axis(turns[after], np.arange(8)[None, :, None], 2)[..., 0]).sum()
+        )
+        return found
+
+    def measured(self, paths: SampledPaths, nominal_m: FloatArray) -> dict[str, FloatArray]:
+        """Properties of drawn paths.
+
+        Args:
+            paths: On the same lattice.
+            nominal_m: (k, 2) m.
+
+        Returns:
+            (paths,) values by name.
+        """
+        return additive(self, paths) | {"area_m2": areas_m2(self.lattice.xy_m[paths.states], nominal_m)}
+
+
+def moves_of(lattice: Lattice, states: IntArray) -> IntArray:
+    """(paths, steps) numbers of the moves between successive states of padded paths; -1 where a path stays."""
+    difference = np.diff(lattice.cells[states], axis=1)
+    number = np.full((3, 3), -1)
+    number[MOVES[:, 0] + 1, MOVES[:, 1] + 1] = np.arange(8)
+    moves: IntArray = number[difference[..., 0] + 1, difference[..., 1] + 1]
+    return moves
+
+
+def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
+    """Properties that follow from the steps one by one, by name, (paths,) each."""
+    here, moves = paths.states[:, :-1], moves_of(steps.lattice, paths.states)
+    driven = moves >= 0
+    parts = steps.segments
+
+    def total(values: FloatArray) -> FloatArray:
+        summed: FloatArray = np.where(driven, values[here, moves], 0.0).sum(axis=1)
+        return summed
+
+    length = np.where(driven, steps.lattice.step_m[moves], 0.0).sum(axis=1)
+    both = driven[:, 1:] & driven[:, :-1]
+    turned = np.where(both, _TURN[moves[:, :-1], moves[:, 1:]], 0.0).sum(axis=1)
+    found = {
+        "length_m": length,
+        "min_distance_m": np.where(driven, parts.least_m[here, moves], np.inf).min(axis=1),
+        "mean_distance_m": total(parts.distance_m2) / length,
+        "heading_rad": turned,
+    }
+    if np.isnan(parts.least_m).all():
+        found["min_distance_m"] = found["mean_distance_m"] = np.full(len(length), np.nan)
+    for number, (name, _) in enumerate(ZONES):
+        found[f"{name}_m"] = total(parts.zones_m[..., number])
+    return found
+
+
+def areas_m2(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
+    """Areas between many lines and a nominal one, as :func:`navirl_cli.evaluation.metrics.area_between_m2` of each.
+
+    Args:
+        lines_m: (m, n, 2) m; a line may rest at its end.
+        nominal_m: (k, 2) m.
+    """
+    import shapely
+
+    back = np.broadcast_to(nominal_m[::-1], (len(lines_m), *nominal_m.shape))
+    rings = np.concatenate([lines_m, back, lines_m[:, :1]], axis=1)
+    faces = shapely.polygonize(shapely.node(shapely.linestrings(rings))[:, None])
+    area: FloatArray = shapely.area(faces)
+    return area
+
+
+def standard_errors(values: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Monte Carlo standard errors of the means of drawn paths' values; NaN where one is not known."""
+    return {name: float(own.std(ddof=1) / np.sqrt(len(own))) for name, own in values.items()}

@@ -1,0 +1,91 @@
+"""How well a learnt policy explains each path: where its log-likelihood ranks among those of the policy's own paths.
+
+If demonstrations came from the policy, ranks would be uniform between 0 and 1 (A. P. Dawid, Statistical theory: the
+prequential approach, Journal of the Royal Statistical Society A 147 (1984); S. Talts et al., Validating Bayesian
+inference algorithms with simulation-based calibration, 2018). Ranks near 0 are of paths that the policy hardly takes;
+ranks crowded at 1 of paths that are more typical than paths are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.evaluation.compare import group_of
+from navirl_cli.irl.evidence import moves_along
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.paths import SampledPaths, sample_paths
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.values import Policy
+
+
+@dataclass(frozen=True)
+class Rank:
+    """Where one demonstration ranks."""
+
+    id: str
+    group: str
+    #: Of the demonstrated path under the policy, nats.
+    log_likelihood: float
+    #: Share of the policy's paths that are less likely, in [0, 1]; equal ones are shared out by chance.
+    rank: float
+
+
+def ranks_of(
+    demonstrations: Sequence[Demonstration],
+    reward: Reward,
+    samples: int,
+    rng: np.random.Generator,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Rank]:
+    """Rank demonstrations among paths drawn from a policy in their scenes.
+
+    Args:
+        demonstrations: Best such as the reward was not learnt from.
+        reward: What was learnt.
+        samples: Paths to draw in each scene.
+        rng: Source of randomness.
+        progress: Called with demonstrations done and in all.
+
+    Raises:
+        SceneError: A demonstration's scene has no way.
+        InfinitePartitionError: The reward has no policy in a scene.
+    """
+    drawn: dict[int, tuple[Policy, FloatArray]] = {}
+    found = []
+    for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
+        if id(scene) not in drawn:
+            policy = policy_of(reward, scene)
+            paths = sample_paths(policy, scene.start, samples, rng)
+            drawn[id(scene)] = policy, sampled_log_likelihoods(policy, paths)
+        policy, among = drawn[id(scene)]
+        own = path_log_likelihood(policy, scene.lattice.states_of(one.cells), moves_along(one.cells))
+        # Sums in another order differ in their last digits.
+        below, equal = (among < own - 1e-9).sum(), (np.abs(among - own) <= 1e-9).sum()
+        rank = (below + rng.uniform() * (equal + 1)) / (samples + 1)
+        found.append(Rank(one.id, group_of(one), own, float(rank)))
+        if progress is not None:
+            progress(number + 1, len(demonstrations))
+    return found
+
+
+def path_log_likelihood(policy: Policy, states: IntArray, moves: IntArray) -> float:
+    """Log-probability of a (k,) path's k - 1 moves, nats; -inf where the policy never makes one."""
+    with np.errstate(divide="ignore"):
+        return float(np.log(policy.probability[states[:-1], moves]).sum())
+
+
+def sampled_log_likelihoods(policy: Policy, paths: SampledPaths) -> FloatArray:
+    """(paths,) log-probabilities of paths drawn from the policy, nats."""
+    here, after = paths.states[:, :-1], paths.states[:, 1:]
+    with np.errstate(divide="ignore"):
+        logs = np.log(policy.probability)
+    total = np.zeros(len(paths))
+    for step in range(here.shape[1]):
+        driving = np.flatnonzero(here[:, step] != policy.goal)
+        moves = (policy.lattice.neighbours[here[driving, step]] == after[driving, step, None]).argmax(axis=1)
+        total[driving] += logs[here[driving, step], moves]
+    return total

@@ -1,0 +1,78 @@
+"""Paired comparisons by participant, against closed forms and enumeration."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from navirl_cli.evaluation.paired import FEWEST, paired
+
+
+def compare(differences, seed=0):
+    names = [f"p{k}" for k in range(len(differences))]
+    other = dict.fromkeys(names, 10.0)
+    one = {name: 10.0 + value for name, value in zip(names, differences, strict=True)}
+    return paired(one, other, np.random.default_rng(seed))
+
+
+def test_only_who_has_both_counts():
+    found = paired(
+        {"a": 3.0, "b": 1.0, "c": np.nan, "d": 5.0}, {"b": 4.0, "a": 1.0, "c": 2.0}, np.random.default_rng(0)
+    )
+    assert found.differences == {"a": 2.0, "b": -3.0}
+    assert (found.n, found.mean) == (2, -0.5)
+    assert np.isnan([found.lower, found.upper]).all()
+
+
+def test_wilcoxons_p_value_is_that_of_all_signs():
+    values = np.array([0.3, -0.1, 0.5, 0.7, 1.1, -0.2])
+    ranks = stats.rankdata(np.abs(values))
+    plus = ranks[values > 0].sum()
+    every = np.array([ranks[np.array(signs)].sum() for signs in product([False, True], repeat=len(values))])
+    tail = min((every >= plus).mean(), (every <= plus).mean())
+    found = compare(values)
+    assert found.p_value == pytest.approx(min(1.0, 2 * tail))
+    assert found.rank_biserial == pytest.approx((plus - (ranks.sum() - plus)) / ranks.sum())
+
+
+def test_effect_sizes_and_mean():
+    values = np.array([0.2, 0.4, 0.1, 0.6, 0.3])
+    found = compare(values)
+    assert found.mean == pytest.approx(values.mean())
+    assert found.cohen_dz == pytest.approx(values.mean() / values.std(ddof=1))
+    assert found.rank_biserial == pytest.approx(1.0)
+    assert compare(-values).rank_biserial == pytest.approx(-1.0)
+    assert compare(-values).mean == pytest.approx(-values.mean())
+
+
+def test_the_interval_covers_the_mean_about_as_often_as_it_says():
+    rng = np.random.default_rng(1)
+    covered = 0
+    for seed in range(120):
+        found = compare(rng.normal(0.5, 1.0, 13), seed)
+        covered += found.lower <= 0.5 <= found.upper
+    # Bootstrap intervals of 13 pairs are a little short: 90 to 95 % for normal differences.
+    assert 0.85 <= covered / 120 <= 0.99
+
+
+@pytest.mark.parametrize("count", range(1, 5))
+def test_few_pairs_have_no_interval(count):
+    found = compare(np.linspace(0.1, 0.4, count))
+    assert np.isfinite(found.lower) == (count >= FEWEST)
+    assert np.isfinite(found.p_value)
+
+
+def test_pairs_that_do_not_differ():
+    found = compare(np.zeros(5))
+    assert (found.mean, found.lower, found.upper) == (0.0, 0.0, 0.0)
+    assert np.isnan([found.p_value, found.cohen_dz, found.rank_biserial]).all()
+    nobody = paired({}, {}, np.random.default_rng(0))
+    assert nobody.n == 0
+    assert np.isnan([nobody.mean, nobody.p_value]).all()
+
+
+def test_the_same_seed_gives_the_same_interval():
+    values = np.random.default_rng(2).normal(size=9)
+    assert compare(values, 3) == compare(values, 3)
+    assert compare(values, 3).lower != compare(values, 4).lower
