@@ -15,7 +15,7 @@ COMMANDS = {
     "inspect": "Tell what logs hold, and what extract would make of it.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
-    "evaluate": "Measure demonstrated, learnt and baseline paths.",
+    "evaluate": "Measure demonstrated, learnt and baseline paths, and how groups of them differ.",
     "plot": "Draw paths, policy, reward or path properties.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",

@@ -233,7 +233,9 @@ def test_notes_go_to_stderr(navirl, tmp_path):
         ("fit", "demos.json", "-o", "r.json", "--init", "c0=a"),
         ("fit", "demos.json", "-o", "r.json", "--init", "c7=1"),
         ("fit", "demos.json", "-o", "r.json", "--l2", "-1"),
-        ("evaluate", "demos.json", "--json", "--csv"),
+        ("evaluate", "demos.json", "--format", "xml"),
+        ("evaluate", "demos.json", "--metrics", "length_m,speed"),
+        ("evaluate", "demos.json", "--ranks"),
         ("plot", "nothing", "demos.json"),
         ("extract", "a.mcap", "-o", "x.json", "--robot-radius", "nan"),
         ("extract", "a.mcap", "-o", "x.json", "--contact-force", "inf"),
@@ -316,8 +318,8 @@ def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
     table = navirl(*words, "-o", "metrics.csv").stdout
     document = json.loads(navirl(*words, "--json", "-o", "metrics.json").stdout)
     assert read_json(Path("metrics.json"), "metrics")["groups"] == document["groups"]
-    rows = list(csv.DictReader(io.StringIO(navirl(*words, "--csv").stdout)))
-    assert Path("metrics.csv").read_text() == navirl(*words, "--csv").stdout
+    rows = list(csv.DictReader(io.StringIO(navirl(*words, "--format", "csv").stdout)))
+    assert Path("metrics.csv").read_text() == navirl(*words, "--format", "csv").stdout
     assert len(rows) == len(document["groups"]) == 4 * 5
     for row, group in zip(rows, document["groups"], strict=True):
         assert (row["group"], row["paths"], int(row["n"])) == (group["group"], group["paths"], group["count"])
@@ -327,7 +329,7 @@ def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
 
 
 def test_evaluate_knows_one_seed_from_another(navirl, work):
-    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "5", "--csv")
+    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "5", "--format", "csv")
     assert navirl(*words).stdout == navirl(*words, "--seed", "0").stdout
     assert navirl(*words).stdout != navirl(*words, "--seed", "1").stdout
 
@@ -337,7 +339,7 @@ def test_evaluate_without_a_reward_measures_no_learnt_paths(navirl, work):
     assert document["samples"] == 0
     assert {group["paths"] for group in document["groups"]} == {"driven", "driven, on grid", "nominal", "avoidance"}
     message = navirl("evaluate", work / "demos.json", "-o", "m.txt", code=1).stderr
-    assert "m.txt: expected a name that ends in .json or .csv, found '.txt'" in message
+    assert "m.txt: expected a name that ends in one of .json, .csv, .md, .tex, found '.txt'" in message
 
 
 def test_plot_draws_every_kind(navirl, work):

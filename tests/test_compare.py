@@ -1,5 +1,7 @@
 """Demonstrated, learnt and baseline paths side by side."""
 
+from itertools import pairwise
+
 import factories as make
 import numpy as np
 import oracles
@@ -17,11 +19,17 @@ from navirl_cli.evaluation.compare import (
     compare,
     group_of,
 )
+from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.metrics import line_values
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import scenes_of
 
 GRID = make.open_grid(40, 21)
 PERSON = np.array([[2.03, 0.98]])
 ROW = 10
+REWARD = Reward((-60.0, -0.5, -6.0, 2.0))
 STRAIGHT = [[c, ROW] for c in range(1, 39)]
 # Round the person at a distance of 7 cells.
 ROUND = [
@@ -37,8 +45,9 @@ def trial(cells, number, condition=Condition.FORCE, cycle=2, people=PERSON, **fi
 TRIALS = [trial(STRAIGHT, 1), trial(ROUND, 2), trial(ROUND, 3, Condition.JOYSTICK, None)]
 
 
-def run(trials=TRIALS, reward=None, samples=0, seed=0):
-    return compare(trials, reward, samples, np.random.default_rng(seed))
+def run(trials=TRIALS, reward=None, samples=10, seed=0, **words):
+    rewards = {} if reward is None else reward if isinstance(reward, dict) else {"r": reward}
+    return compare(trials, rewards, Precision(samples), np.random.default_rng(seed), **words)
 
 
 def of(comparison, group, kind):
@@ -55,63 +64,133 @@ def test_mean_and_spread_of_what_was_driven():
     lengths = [oracles.length_by_steps(one.xy_m) for one in TRIALS[:2]]
     assert lengths[0] == pytest.approx(3.7)
     assert group.count == 2
-    assert group.mean.length_m == pytest.approx(np.mean(lengths))
-    assert group.std.length_m == pytest.approx(abs(lengths[1] - lengths[0]) / np.sqrt(2))  # n - 1
+    assert group.mean["length_m"] == pytest.approx(np.mean(lengths))
+    assert group.std["length_m"] == pytest.approx(abs(lengths[1] - lengths[0]) / np.sqrt(2))  # n - 1
     near = [oracles.distance_by_sampling(one.xy_m, PERSON, 2000) - 0.25 for one in TRIALS[:2]]
-    assert group.mean.min_distance_m == pytest.approx(np.mean(near), abs=1e-4)
+    assert group.mean["min_distance_m"] == pytest.approx(np.mean(near), abs=1e-4)
     # The detour is a trapezoid of sides 3.7 and 2.3 and height 0.7; the straight one has no area.
-    assert group.mean.area_m2 == pytest.approx((3.7 + 2.3) / 2 * 0.7 / 2)
+    assert group.mean["area_m2"] == pytest.approx((3.7 + 2.3) / 2 * 0.7 / 2)
 
 
 def test_one_path_has_no_spread():
     group = of(run(), "joystick", DRIVEN)
     assert group.count == 1
-    assert np.isnan(group.std.length_m)
+    assert np.isnan(group.std["length_m"])
 
 
 def test_what_was_driven_is_listed_by_demonstration():
     comparison = run()
-    assert [(name, group) for name, group, _ in comparison.driven] == [
-        ("p1/1", "force, cycle 2"), ("p1/2", "force, cycle 2"), ("p1/3", "joystick")
+    assert [(row.id, row.participant, row.group) for row in comparison.driven] == [
+        ("p1/1", "p1", "force, cycle 2"), ("p1/2", "p1", "force, cycle 2"), ("p1/3", "p1", "joystick")
     ]  # fmt: skip
-    assert comparison.driven[1][2].length_m == pytest.approx(oracles.length_by_steps(TRIALS[1].xy_m))
+    assert comparison.driven[1].values["length_m"] == pytest.approx(oracles.length_by_steps(TRIALS[1].xy_m))
 
 
 def test_poses_beside_the_centres_change_what_was_driven_but_not_what_is_on_the_grid():
     moved = trial(STRAIGHT, 1, xy_m=GRID.centres_of(STRAIGHT) + np.array([0.0, 0.03]))
     comparison = run([moved])
-    assert of(comparison, "force, cycle 2", DRIVEN).mean.area_m2 == pytest.approx(3.7 * 0.03)
-    assert of(comparison, "force, cycle 2", ON_GRID).mean.area_m2 == pytest.approx(0.0, abs=1e-12)
+    assert of(comparison, "force, cycle 2", DRIVEN).mean["area_m2"] == pytest.approx(3.7 * 0.03)
+    assert of(comparison, "force, cycle 2", ON_GRID).mean["area_m2"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_baselines_are_the_straight_way_and_the_one_that_keeps_clear():
     comparison = run()
     nominal, avoidance = (of(comparison, "joystick", kind).mean for kind in (NOMINAL, AVOIDANCE))
-    assert nominal.length_m == pytest.approx(3.7)
-    assert nominal.area_m2 == pytest.approx(0.0, abs=1e-12)
-    assert nominal.min_distance_m == pytest.approx(1.05 - 0.98 - 0.25)
-    assert PERSON_RADIUS_M <= avoidance.min_distance_m < PERSON_RADIUS_M + 0.1
-    assert 3.7 < avoidance.length_m < 4.2
-    assert avoidance.area_m2 > 0
+    assert nominal["length_m"] == pytest.approx(3.7)
+    assert nominal["area_m2"] == pytest.approx(0.0, abs=1e-12)
+    assert nominal["min_distance_m"] == pytest.approx(1.05 - 0.98 - 0.25)
+    assert PERSON_RADIUS_M <= avoidance["min_distance_m"] < PERSON_RADIUS_M + 0.1
+    assert 3.7 < avoidance["length_m"] < 4.2
+    assert avoidance["area_m2"] > 0
 
 
-def test_learnt_paths_are_drawn_for_every_demonstration_from_the_seed():
-    reward = Reward((-60.0, -0.5, -6.0, 2.0))
-    one, two, other = (
-        run(reward=reward, samples=4),
-        run(reward=reward, samples=4),
-        run(reward=reward, samples=4, seed=1),
-    )
+def test_learnt_paths_are_drawn_once_a_scene_from_the_seed():
+    one, two, other = (run(reward=REWARD, samples=40, seed=seed) for seed in (0, 0, 1))
     learnt = of(one, "force, cycle 2", LEARNT)
-    assert learnt.count == 8
+    assert learnt.count == 2
     assert learnt == of(two, "force, cycle 2", LEARNT)
     assert learnt != of(other, "force, cycle 2", LEARNT)
-    assert learnt.mean.min_distance_m > of(one, "force, cycle 2", NOMINAL).mean.min_distance_m
-    assert not [group for group in run(reward=reward, samples=0).groups if group.kind == LEARNT]
+    assert learnt.mean["min_distance_m"] > of(one, "force, cycle 2", NOMINAL).mean["min_distance_m"]
+    # The scene is the same, and so are its paths; only what they are compared with differs.
+    joystick = of(one, "joystick", LEARNT)
+    assert {name: joystick.mean[name] for name in ("length_m", "area_m2")} == {
+        name: learnt.mean[name] for name in ("length_m", "area_m2")
+    }
+    assert joystick.mean["hausdorff_m"] != learnt.mean["hausdorff_m"]
+
+
+def test_learnt_values_are_those_of_the_paths_one_by_one():
+    learnt = of(run(reward=REWARD, samples=200), "force, cycle 2", LEARNT)
+    scene = scenes_of(TRIALS[:1])[0]
+    policy = policy_of(REWARD, scene)
+    paths = sample_paths(policy, scene.start, 200, np.random.default_rng(0))
+    lines = sampled_lines_m(policy, paths)
+    nominal = scene.nominal_line_m()
+    values = [line_values(line, nominal, PERSON, 0.25) for line in lines]
+    for name in values[0]:
+        own = np.array([one[name] for one in values])
+        loose = {"intimate_m", "personal_m", "social_m"} | {
+            f"{zone}_share" for zone in ("intimate", "personal", "social")
+        }
+        rel = 1e-2 if name in loose or name in {"mean_distance_m", "compliance"} else 1e-9
+        assert learnt.mean[name] == pytest.approx(own.mean(), rel=rel, abs=1e-9), name
+        assert learnt.std[name] == pytest.approx(own.std(), rel=10 * rel, abs=1e-6), name
+        assert learnt.error[name] == pytest.approx(own.std(ddof=1) / np.sqrt(200), rel=10 * rel, abs=1e-6), name
+    shown = [GRID.centres_of(one.cells) for one in TRIALS[:2]]
+    there = [[oracles_mean(demo, line) for line in lines] for demo in shown]
+    back = [[oracles_mean(line, demo) for line in lines] for demo in shown]
+    assert learnt.mean["to_learnt_m"] == pytest.approx(np.mean(there))
+    assert learnt.mean["from_learnt_m"] == pytest.approx(np.mean(back))
+    assert learnt.mean["dissimilarity_m"] == pytest.approx((np.mean(there) + np.mean(back)) / 2)
+    assert learnt.mean["hausdorff_m"] == pytest.approx(np.maximum(there, back).mean())
+
+
+def oracles_mean(one, other):
+    """Mean over points of the distance to another line's segments."""
+    return np.mean(
+        [min(oracles.distance_to_segment(tuple(p), tuple(a), tuple(b))[0] for a, b in pairwise(other)) for p in one]
+    )
+
+
+def test_exact_values_stand_beside_those_of_many_paths():
+    learnt = of(run(reward=REWARD, samples=4000), "force, cycle 2", LEARNT)
+    assert set(learnt.exact) == {"length_m", "heading_rad", "intimate_m", "personal_m", "social_m", "public_m"}
+    for name, value in learnt.exact.items():
+        assert abs(learnt.mean[name] - value) <= 4 * learnt.error[name] + 1e-9, name
+
+
+def test_a_precision_draws_until_it_is_reached():
+    asked = compare(TRIALS, {"r": REWARD}, Precision(50, 0.02), np.random.default_rng(0))
+    learnt = of(asked, "force, cycle 2", LEARNT)
+    for name in learnt.exact | {"area_m2": 0, "min_distance_m": 0}:
+        allowed = 0.02 * max(abs(learnt.mean[name]), learnt.std[name])
+        assert learnt.error[name] <= 1.2 * allowed + 1e-12, name
+    few = of(run(reward=REWARD, samples=50), "force, cycle 2", LEARNT)
+    assert learnt.error["area_m2"] < few.error["area_m2"] / 3
+
+
+def test_several_rewards_stand_side_by_side():
+    comparison = run(reward={"near": REWARD, "far": Reward((-60.0, -0.5, -30.0, 1.0))}, samples=20)
+    kinds = [row.kind for row in comparison.groups if row.group == "joystick"]
+    assert kinds == ["driven", "driven, on grid", "learnt, far", "learnt, near", "nominal", "avoidance"]
+    far, near = (of(comparison, "joystick", f"learnt, {name}") for name in ("far", "near"))
+    assert far.mean["min_distance_m"] > near.mean["min_distance_m"]
+
+
+def test_groups_can_be_made_by_other_fields():
+    trials = [trial(STRAIGHT, 1), trial(ROUND, 1, participant="p2"), trial(ROUND, 2, Condition.JOYSTICK, None)]
+    by = {row.group for row in run(trials, fields=("participant",)).groups}
+    assert by == {"p1", "p2"}
+    assert {row.group for row in run(trials, fields=("participant", "condition")).groups} == {
+        "force, p1", "force, p2", "joystick, p1",
+    }  # fmt: skip
+    assert {row.group for row in run(trials, fields=("cycle", "set")).groups} == {
+        "cycle 2, main task", "no cycle, main task",
+    }  # fmt: skip
 
 
 def test_groups_come_in_the_order_of_the_table():
-    comparison = run(reward=Reward((-60.0, -0.5, -6.0, 2.0)), samples=1)
+    comparison = run(reward=REWARD, samples=2)
     kinds = list(KINDS)
     assert [(one.group, one.kind) for one in comparison.groups] == [
         (group, kind) for group in ("force, cycle 2", "joystick") for kind in kinds
@@ -131,11 +210,11 @@ def test_where_no_way_is_left_around_a_person_the_rest_is_measured_and_it_is_sai
 def test_without_people_there_are_no_distances():
     comparison = run([trial(STRAIGHT, 1, people=make.NOBODY)])
     for group in comparison.groups:
-        assert np.isnan(group.mean.min_distance_m)
-        assert group.mean.length_m == pytest.approx(3.7)
+        assert np.isnan(group.mean["min_distance_m"])
+        assert group.mean["length_m"] == pytest.approx(3.7)
 
 
 def test_progress_counts_demonstrations():
     seen = []
-    compare(TRIALS, None, 0, np.random.default_rng(0), lambda done, of_all: seen.append((done, of_all)))
+    run(progress=lambda done, of_all: seen.append((done, of_all)))
     assert seen == [(1, 3), (2, 3), (3, 3)]

@@ -7,18 +7,22 @@ import pytest
 from matplotlib.colors import to_hex
 
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.metrics import METRICS, PathMetrics
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures.properties import PropertyBar, draw_properties, height_for
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of
 
 
+def values(three):
+    return dict(zip((metric.name for metric in PAPER_METRICS), three, strict=True))
+
+
 def bar(label="force, cycle 1", key="force, cycle 1", mean=(6.5, 0.5, 2.0), std=(0.1, 0.2, 0.5), count=12):
-    return PropertyBar(label, key, PathMetrics(*mean), PathMetrics(*std), count)
+    return PropertyBar(label, key, values(mean), values(std), count)
 
 
 def properties(bars, width_in=PAGE_IN):
-    figure, axes = new_figure(width_in, height_for(bars, width_in), panels=len(METRICS))
+    figure, axes = new_figure(width_in, height_for(bars, width_in), panels=len(PAPER_METRICS))
     return figure, draw_properties(axes, bars)
 
 

@@ -8,12 +8,14 @@ import oracles
 import pytest
 
 from navirl_cli.evaluation.metrics import (
+    BY_NAME,
     METRICS,
-    PathMetrics,
+    PAPER_METRICS,
     area_between_m2,
     center_distance_m,
+    line_values,
+    paper_values,
     path_length_m,
-    path_metrics,
 )
 
 STRAIGHT = np.array([[0.0, 0.0], [4.0, 0.0]])
@@ -29,19 +31,19 @@ def wavy(seed, poses=60):
 
 def test_a_square_detour():
     detour = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 0.0], [4.0, 0.0]])
-    found = path_metrics(detour, STRAIGHT, np.array([[1.5, 0.4]]), 0.25)
-    assert found.length_m == pytest.approx(6.0)
-    assert found.area_m2 == pytest.approx(1.0)
-    assert found.min_distance_m == pytest.approx(0.5 - 0.25)  # to the detour's sides at x = 1 and x = 2
+    found = paper_values(detour, STRAIGHT, np.array([[1.5, 0.4]]), 0.25)
+    assert found["length_m"] == pytest.approx(6.0)
+    assert found["area_m2"] == pytest.approx(1.0)
+    assert found["min_distance_m"] == pytest.approx(0.5 - 0.25)  # to the detour's sides at x = 1 and x = 2
 
 
 def test_half_a_circle():
     angles = np.linspace(pi, 0, 2001)
     arc = np.stack([1 + np.cos(angles), np.sin(angles)], axis=1)
-    found = path_metrics(arc, np.array([[0.0, 0.0], [2.0, 0.0]]), np.array([[1.0, 0.0]]), 0.0)
-    assert found.length_m == pytest.approx(pi, rel=1e-6)
-    assert found.area_m2 == pytest.approx(pi / 2, rel=1e-6)
-    assert found.min_distance_m == pytest.approx(1.0, rel=1e-6)
+    found = paper_values(arc, np.array([[0.0, 0.0], [2.0, 0.0]]), np.array([[1.0, 0.0]]), 0.0)
+    assert found["length_m"] == pytest.approx(pi, rel=1e-6)
+    assert found["area_m2"] == pytest.approx(pi / 2, rel=1e-6)
+    assert found["min_distance_m"] == pytest.approx(1.0, rel=1e-6)
 
 
 def test_areas_on_both_sides_do_not_cancel():
@@ -104,13 +106,13 @@ def test_the_nearest_of_several_people_counts_and_standing_still_does_not_hurt()
 
 
 def test_a_person_within_the_shell_gives_a_negative_distance():
-    assert path_metrics(STRAIGHT, STRAIGHT, np.array([[2.0, 0.1]]), 0.25).min_distance_m == pytest.approx(-0.15)
+    assert paper_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.1]]), 0.25)["min_distance_m"] == pytest.approx(-0.15)
 
 
 def test_without_people_there_is_no_distance():
-    found = path_metrics(STRAIGHT, STRAIGHT, NOBODY, 0.25)
-    assert np.isnan(found.min_distance_m)
-    assert found.length_m == 4.0
+    found = paper_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
+    assert np.isnan(found["min_distance_m"])
+    assert found["length_m"] == 4.0
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.9, -2.4])
@@ -118,11 +120,56 @@ def test_turning_and_moving_the_world_changes_nothing(angle):
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
     line, nominal, people = wavy(3), wavy(4), np.array([[2.0, 0.7]])
     there = [points @ turn.T + [30.0, -7.0] for points in (line, nominal, people)]
-    before, after = path_metrics(line, nominal, people, 0.2), path_metrics(*there, 0.2)
-    assert [after.length_m, after.min_distance_m, after.area_m2] == pytest.approx(
-        [before.length_m, before.min_distance_m, before.area_m2], rel=1e-9
+    before, after = paper_values(line, nominal, people, 0.2), paper_values(*there, 0.2)
+    assert [after["length_m"], after["min_distance_m"], after["area_m2"]] == pytest.approx(
+        [before["length_m"], before["min_distance_m"], before["area_m2"]], rel=1e-9
     )
 
 
-def test_every_metric_of_the_table_is_measured():
-    assert [metric.name for metric in METRICS] == list(PathMetrics.__dataclass_fields__)
+def test_names_are_unique_and_the_papers_come_first():
+    assert len(BY_NAME) == len(METRICS)
+    assert METRICS[:3] == PAPER_METRICS
+    found = line_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.5]]), 0.25)
+    assert set(found) <= set(BY_NAME)
+    assert {name: found[name] for name in ("length_m", "min_distance_m", "area_m2")} == pytest.approx(
+        paper_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.5]]), 0.25)
+    )
+
+
+def test_zones_shares_and_mean_distance_of_a_straight_line():
+    # Past a person 0.5 m beside its middle, shell of 0.25 m: intimate below 0.7 m between centres, personal below 1.45.
+    found = line_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.5]]), 0.25)
+    near, far = 2 * sqrt(0.7**2 - 0.25), 2 * sqrt(1.45**2 - 0.25)
+    assert found["intimate_m"] == pytest.approx(near, abs=0.01)
+    assert found["personal_m"] == pytest.approx(far - near, abs=0.02)
+    assert found["social_m"] == pytest.approx(4.0 - far, abs=0.01)
+    assert found["public_m"] == 0.0
+    assert found["intimate_share"] == pytest.approx(near / 4, abs=0.003)
+    assert found["compliance"] == pytest.approx(1 - found["intimate_share"])
+    x = np.linspace(-2, 2, 100_001)
+    assert found["mean_distance_m"] == pytest.approx(np.trapezoid(np.hypot(x, 0.5), x) / 4 - 0.25, abs=1e-4)
+
+
+def test_heading_changes_and_curvature():
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 0.0], [4.0, 0.0]])
+    found = line_values(square, STRAIGHT, NOBODY, 0.25)
+    assert found["heading_rad"] == pytest.approx(4 * pi / 2)
+    assert found["curvature_1_m"] == pytest.approx(4 * pi / 2 / 6)
+    angles = np.linspace(pi, 0, 2001)
+    arc = np.stack([1 + np.cos(angles), np.sin(angles)], axis=1)
+    assert line_values(arc, STRAIGHT, NOBODY, 0.25)["heading_rad"] == pytest.approx(pi, rel=0.05)
+    assert line_values(arc, STRAIGHT, NOBODY, 0.25)["curvature_1_m"] == pytest.approx(1.0, rel=0.05)
+
+
+def test_shaking_in_place_turns_nothing():
+    rng = np.random.default_rng(0)
+    line = np.stack([np.linspace(0, 4, 400), rng.normal(0, 0.002, 400)], axis=1)
+    assert line_values(line, STRAIGHT, NOBODY, 0.25)["heading_rad"] < 2.0
+    standing = np.concatenate([line, line[-1] + rng.normal(0, 0.01, (300, 2))])
+    assert line_values(standing, STRAIGHT, NOBODY, 0.25)["heading_rad"] < 3.0
+
+
+def test_without_people_there_are_no_zones():
+    found = line_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
+    for name in ("mean_distance_m", "compliance", "intimate_m", "public_share"):
+        assert np.isnan(found[name]), name

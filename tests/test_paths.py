@@ -7,7 +7,7 @@ import pytest
 from navirl_cli.errors import RewardError
 from navirl_cli.irl import paths
 from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.paths import length_moments, sample_paths, sampled_lines_m
+from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 
 SCENE = make.random_scene(np.random.default_rng(4), 13, 9, density=0.15)
@@ -82,43 +82,3 @@ def test_a_path_that_wanders_on_and_on_is_given_up(monkeypatch):
     corridor = make.scene_on(make.open_grid(150, 1), [0, 0], [149, 0])
     with pytest.raises(RewardError, match="a sampled path wandered for 100 steps without reaching the goal"):
         sample_paths(policy_of(Reward((-30.0, 0.0, 0.0, 1.0)), corridor), corridor.start, 2, np.random.default_rng(0))
-
-
-def test_moments_of_the_length_are_those_of_many_paths():
-    count = 20_000
-    drawn = draw(count, 3)
-    lengths = np.array([np.hypot(*np.diff(line, axis=0).T).sum() for line in sampled_lines_m(POLICY, drawn)])
-    mean, variance = length_moments(POLICY, SCENE.start)
-    assert abs(lengths.mean() - mean) < 4 * np.sqrt(variance / count)
-    # The standard error of a variance, with the sample's own fourth moment.
-    error = np.sqrt((((lengths - mean) ** 2 - variance) ** 2).mean() / count)
-    assert abs(lengths.var() - variance) < 4 * error
-
-
-def test_moments_of_the_length_on_a_drawing_of_two_ways():
-    # One step straight, or one that is diagonal and one more: the policy chooses between 0.1 m and 0.1 (1 + sqrt 2) m.
-    scene = make.scene_on(make.grid_of("..\n.#"), [0, 0], [1, 1])
-    policy = policy_of(Reward((-40.0, 0.0, 0.0, 1.0)), scene)
-    mean, variance = length_moments(policy, scene.start)
-    # Written out: paths from the start, by brute force over the chain of three states.
-    step, start, goal = scene.lattice.step_m, scene.start, scene.goal
-    chances = {(start, 0.0): 1.0}
-    ended: dict[float, float] = {}
-    for _ in range(400):
-        after: dict[tuple[int, float], float] = {}
-        for (state, length), chance in chances.items():
-            for move in range(8):
-                share = chance * policy.probability[state, move]
-                if share > 1e-18:
-                    place = (
-                        int(scene.lattice.neighbours[state, move]),
-                        round(length + float(np.broadcast_to(step, 8)[move]), 9),
-                    )
-                    book = ended if place[0] == goal else after
-                    key = place[1] if place[0] == goal else place
-                    book[key] = book.get(key, 0.0) + share
-        chances = after
-    lengths, weights = np.array(list(ended)), np.array(list(ended.values()))
-    assert weights.sum() == pytest.approx(1.0)
-    assert mean == pytest.approx(weights @ lengths)
-    assert variance == pytest.approx(weights @ (lengths - mean) ** 2)

@@ -7,8 +7,8 @@ import numpy as np
 import oracles
 import pytest
 
-from navirl_cli.evaluation.metrics import area_between_m2, center_distance_m, path_length_m
-from navirl_cli.evaluation.policy_paths import Steps, areas_m2, moves_of, standard_errors
+from navirl_cli.evaluation.metrics import area_between_m2, areas_m2, center_distance_m, path_length_m
+from navirl_cli.evaluation.policy_paths import Steps, moves_of, standard_errors
 from navirl_cli.evaluation.segments import ZONES, segments
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
@@ -106,7 +106,7 @@ def test_without_people_there_are_no_distances():
     values = steps.measured(paths, NOMINAL)
     assert np.isnan(values["min_distance_m"]).all()
     assert np.isnan(values["mean_distance_m"]).all()
-    assert values["intimate_m"].tolist() == [0.0] * 5
+    assert np.isnan(values["intimate_m"]).all()
     assert np.isfinite(values["area_m2"]).all()
 
 

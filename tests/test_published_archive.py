@@ -1,7 +1,9 @@
 """The archive: read member by member, whatever somebody put into it; and the folders into which it was unpacked."""
 
+import bz2
 import gzip
 import io
+import lzma
 import os
 import tarfile
 
@@ -159,7 +161,7 @@ def test_wrong_bytes_are_told(path):
     [
         (b"", "empty file"),
         (b"hello", "truncated header"),
-        (b"PK\3\4" + bytes(600), "(bad checksum|invalid header)"),
+        (b"no tar" + bytes(600), "(bad checksum|invalid header)"),
         (b"\x1f\x8b", "Compressed file ended before the end-of-stream marker was reached"),
         (gzip.compress(b"hello", mtime=0), "truncated header"),
     ],
@@ -254,11 +256,6 @@ def test_without_participants_there_is_nothing_to_import(tmp_path, kind):
         runs_in(root)
 
 
-def test_a_missing_path_is_told(tmp_path):
-    with refused(tmp_path / "nowhere", "No such file or directory"):
-        runs_in(tmp_path / "nowhere")
-
-
 def test_what_is_expected_of_a_participant():
     assert io.StringIO("\n".join(EXPECTED)).read().split() == [
         "nav_map.pkl",
@@ -268,3 +265,18 @@ def test_what_is_expected_of_a_participant():
         "force_parcours_times.txt",
         "joystick_parcours_times.txt",
     ]
+
+
+@pytest.mark.parametrize(
+    ("pack", "name"), [(lzma.compress, "xz"), (bz2.compress, "bzip2"), (lambda data: b"PK\3\4" + data, "zip")]
+)
+def test_other_compressions_are_named(tmp_path, pack, name):
+    path = tmp_path / "runs.tar.other"
+    path.write_bytes(pack(gzip.decompress(forge.archive(FILES))))
+    with pytest.raises(ArtefactError, match=rf"found {name}; unpack it first"):
+        runs_in(path)
+
+
+def test_nothing_there_is_said(tmp_path):
+    with pytest.raises(ArtefactError, match=r"nosuch: expected the study's archive or folder, found nothing there"):
+        runs_in(tmp_path / "nosuch")

@@ -105,7 +105,7 @@ def test_an_empty_text_is_refused(read, row, column):
         ("participant,question,answer,", r"found an unknown column ''; remove it"),
         ("participant,question,answer,answer", r"found a second column 'answer'; remove it"),
         ("participant\tquestion\tanswer", r"found no column participant but 'participant question answer'"),
-        ("", r"found nothing$"),
+        ("", r"found nothing; give the file with the answers$"),
     ],
 )
 def test_other_columns_are_refused(read, header, found):

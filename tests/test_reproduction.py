@@ -93,9 +93,9 @@ def test_path_properties_of_what_the_logs_hold(extracted, run):
         metrics = results["metrics"]
         assert len(metrics) in {0, len(rows)}
         for row, expected in zip(rows, metrics, strict=False):
-            assert row.driven.length_m == pytest.approx(expected["length_m"], rel=1e-6)
+            assert row.driven["length_m"] == pytest.approx(expected["length_m"], rel=1e-6)
             assert row.center_distance_m == pytest.approx(expected["min_center_distance_m"], rel=1e-6)
-            assert row.driven.area_m2 == pytest.approx(expected["area_under_path_m2"], rel=1e-2)
+            assert row.driven["area_m2"] == pytest.approx(expected["area_under_path_m2"], rel=1e-2)
 
 
 def test_the_summary_holds_the_same_means(summary):

@@ -8,6 +8,7 @@ from truth import read_truth
 
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, compare
+from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Status, fit
 from navirl_cli.irl.likelihood import log_likelihood
@@ -103,10 +104,10 @@ def test_the_fit_is_at_least_as_likely_as_any_truth(pairs, second_cycles, pooled
 
 
 def test_learnt_paths_keep_the_demonstrated_distance(second_cycles, pooled):
-    result = compare(second_cycles, pooled.reward, 100, np.random.default_rng(0))
+    result = compare(second_cycles, {"pooled": pooled.reward}, Precision(100), np.random.default_rng(0))
     rows = {row.kind: row for row in result.groups}
     driven, learnt = rows[DRIVEN], rows[LEARNT]
-    assert abs(learnt.mean.min_distance_m - driven.mean.min_distance_m) < driven.std.min_distance_m
+    assert abs(learnt.mean["min_distance_m"] - driven.mean["min_distance_m"]) < driven.std["min_distance_m"]
 
 
 def test_the_simulation_still_writes_the_sample_logs(pairs, tmp_path):

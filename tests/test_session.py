@@ -110,7 +110,7 @@ def test_cells_are_held_against_those_published(tmp_path):
 
 
 def test_a_trial_ends_where_the_record_says(tmp_path):
-    entry = {"t_ns": GOAL_NS, "stop_ns": GOAL_NS + 6_000_000_000}
+    entry = {"t_ns": GOAL_NS + 300_000_000, "stop_ns": GOAL_NS + 6_000_000_000}
     recording = load_recording(write_run(tmp_path / "run.mcap", Run(session={"trials": json.dumps([entry])})))
     (one,) = extract(recording, ExtractSettings()).demonstrations
     last = one.start_ns + round(one.t_s[-1] * 1e9)

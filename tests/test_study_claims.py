@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from navirl_cli.evaluation.metrics import PathMetrics
-from navirl_cli.study.claims import Claim, Difference, Verdict, claims_of, paired
+from navirl_cli.evaluation.metrics import PAPER_METRICS
+from navirl_cli.study.claims import Claim, Difference, Verdict, claims_of, paired, scatter_within
 from navirl_cli.study.measures import Measured
 
 FORCE, JOYSTICK, REPLAY, AVOIDANCE = "force, cycle 2", "joystick", "replay of the learnt policy", "obstacle avoidance"
 
 
+def values(*three):
+    return dict(zip((metric.name for metric in PAPER_METRICS), three, strict=True))
+
+
 def row(participant, group, length=6.8, distance=0.7, area=2.4, onset=2.0, on_grid=None):
-    driven = PathMetrics(length, distance - 0.4, area)
+    driven = values(length, distance - 0.4, area)
     return Measured("", participant, group, driven, on_grid or driven, distance, onset)
 
 
@@ -86,7 +90,7 @@ def study(participants=13, seed=0, **shift):
                     name,
                     FORCE,
                     length=6.8 + rng.normal(0, 0.1),
-                    distance=0.7 + own + rng.normal(0, 0.02),
+                    distance=0.7 + own + rng.normal(0, 0.06),
                     area=2.4 + rng.normal(0, 0.2),
                 )
             )
@@ -127,7 +131,9 @@ def test_replays_that_are_far_are_not_close():
 
 def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
     rows = [row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.onset_m) for one in study()]
-    assert "less autonomous" in titled(claims_of(rows, []), "late avoidance").asked
+    claim = titled(claims_of(rows, []), "late avoidance")
+    assert "less autonomous" in claim.asked
+    assert claim.text.startswith("The robot by itself (autonomous) begins")
 
 
 def test_claims_without_data_are_left_out():
@@ -136,19 +142,30 @@ def test_claims_without_data_are_left_out():
 
 
 def near(expected):
-    return SimpleNamespace(near=SimpleNamespace(expected=PathMetrics(*expected)))
+    return SimpleNamespace(near=SimpleNamespace(expected=values(*expected)))
 
 
 def test_expected_paths_are_held_against_those_on_the_grid():
-    shown = PathMetrics(7.0, 0.3, 2.0)
-    rows = [
-        row(f"p{k}", FORCE, length=9.9, on_grid=PathMetrics(7.0 + s, 0.3, 2.0)) for k in range(3) for s in (-0.1, 0.1)
-    ]
-    learnt = [SimpleNamespace(participant=f"p{k}", first=None, second=near((7.02, 0.3, 2.0))) for k in range(3)]
+    rows = [row(f"p{k}", FORCE, on_grid=values(7.0, 0.3 + s, 2.0)) for k in range(3) for s in (-0.1, 0.1)]
+    learnt = [SimpleNamespace(participant=f"p{k}", first=None, second=near((7.5, 0.32, 2.0))) for k in range(3)]
     learnt.append(SimpleNamespace(participant=None, first=near((99, 99, 99)), second=near((99, 99, 99))))
     claims = claims_of(rows, learnt)
-    assert [claim.title for claim in claims] == ["learnt policies"]
-    length = claims[0].differences[0]
-    assert length.mean == pytest.approx(0.02)
-    assert length.margin == pytest.approx(np.std([-0.1, 0.1] * 3, ddof=1))
-    assert shown.length_m + length.mean == pytest.approx(7.02)
+    assert [claim.title for claim in claims] == ["goodness of fit"]
+    # Length is a feature of the reward, and no evidence of its own.
+    assert [one.what for one in claims[0].differences] == ["min. distance", "area under path"]
+    distance = claims[0].differences[0]
+    assert distance.mean == pytest.approx(0.02)
+    # Each participant has two paths 0.2 m apart: 0.1 m about their mean, with one degree of freedom each.
+    assert distance.margin == pytest.approx(0.1 * np.sqrt(2))
+
+
+def test_the_margin_is_the_scatter_within_participants_whatever_lies_between_them():
+    rows = [row(f"p{k}", FORCE, length=6.0 + k + s) for k in range(4) for s in (-0.05, 0.05)]
+    assert scatter_within(rows, lambda one: one.driven["length_m"]) == pytest.approx(0.05 * np.sqrt(2))
+    assert np.isnan(scatter_within(rows[::2], lambda one: one.driven["length_m"]))
+
+
+def test_who_saw_nobody_takes_no_part():
+    rows = [*study(), row("alone", FORCE, distance=float("nan"), area=99.0), row("alone", AVOIDANCE, area=0.0)]
+    area = titled(claims_of(rows, []), "smallest area").differences[0]
+    assert "alone" not in area.values

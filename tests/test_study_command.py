@@ -12,6 +12,7 @@ from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.compare import DRIVEN, compare
+from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
@@ -77,15 +78,15 @@ def test_the_pooled_fit_is_that_of_all_second_cycles(summary, demos):
 
 
 def test_metrics_by_condition_are_those_of_evaluate(summary, demos):
-    rows = {row.group: row for row in compare(demos, None, 0, None).groups if row.kind == DRIVEN}
+    rows = {row.group: row for row in compare(demos, {}, Precision(), None).groups if row.kind == DRIVEN}
     assert set(summary["metrics"]) == set(rows) == {"force, cycle 1", "force, cycle 2", "joystick", "autonomous"}
     for group, row in rows.items():
         driven = summary["metrics"][group]["driven"]
         for name in ("length_m", "min_distance_m", "area_m2"):
             # demos.json rounds positions to a micrometre
-            assert driven[name]["mean"] == pytest.approx(getattr(row.mean, name), rel=1e-4)
-            assert driven[name]["standard_deviation"] == pytest.approx(getattr(row.std, name), rel=1e-3, abs=1e-6)
-        assert driven["min_center_distance_m"]["mean"] == pytest.approx(row.mean.min_distance_m + 0.3, rel=1e-4)
+            assert driven[name]["mean"] == pytest.approx(row.mean[name], rel=1e-4)
+            assert driven[name]["standard_deviation"] == pytest.approx(row.std[name], rel=1e-3, abs=1e-6)
+        assert driven["min_center_distance_m"]["mean"] == pytest.approx(row.mean["min_distance_m"] + 0.3, rel=1e-4)
 
 
 def test_the_report_tells_the_summarys_numbers(written, summary):
@@ -139,6 +140,27 @@ def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
     assert told == {key: value for key, value in summary.items() if key not in {"format", "version", "navirl"}}
 
 
+def test_demonstrations_can_stand_in_for_logs(navirl, written, summary, tmp_path):
+    out, _ = written
+    result = navirl("study", out / "demos.json", "-o", "again", "--samples", 50)
+    again = read_json(tmp_path / "again" / "summary.json", "study")
+    for name in ("p01", "p02", "p03"):
+        assert again["participants"][name]["theta"] == pytest.approx(
+            summary["participants"][name]["theta"], rel=1e-4
+        )  # rounded to a micrometre
+    assert again["published"] is None
+    assert "cells as published" not in result.stdout
+
+
+def test_answers_stand_in_numbers_too(written, summary):
+    text = (written[0] / "report.md").read_text()
+    assert len(summary["answers"]) == 2
+    for one in summary["answers"]:
+        assert (one["n"], sum(one["counts"])) == (6, 6)
+        assert re.search(rf"\| {one['modality']} +\| +6 +\| +{one['median']:g} ", text)
+    assert "participants without a log: p04, p05, p06" in written[1].stderr
+
+
 def test_nothing_is_replaced_unasked(navirl, written):
     out, _ = written
     result = navirl("study", *LOGS, "-o", out, code=1)
@@ -148,7 +170,10 @@ def test_nothing_is_replaced_unasked(navirl, written):
 def test_logs_without_cycles_are_refused(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(wrench_topics=()))
     result = navirl("study", log, "-o", "out", code=1)
-    assert "navirl: a study needs trials of the condition force in cycle 2, found no cycles" in result.stderr
+    assert (
+        "navirl: a study needs trials of the condition force in cycle 2 and without a set, found none of"
+        in result.stderr
+    )
     assert not (tmp_path / "out" / "summary.json").exists()
 
 

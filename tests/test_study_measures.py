@@ -58,18 +58,18 @@ def test_a_path_is_measured_as_driven_and_on_the_grid():
     one = make.demonstration(GRID, STRAIGHT, AT)
     one = make.replace(one, xy_m=xy, t_s=np.arange(4.0), yaw_rad=np.zeros(4))
     (row,) = measured([one])
-    assert row.driven.length_m == pytest.approx(oracles.length_by_steps(xy))
-    assert row.on_grid.length_m == pytest.approx(3.7)
+    assert row.driven["length_m"] == pytest.approx(oracles.length_by_steps(xy))
+    assert row.on_grid["length_m"] == pytest.approx(3.7)
     assert row.center_distance_m == pytest.approx(oracles.distance_by_sampling(xy, AT, 4000), abs=1e-6)
-    assert row.driven.min_distance_m == pytest.approx(row.center_distance_m - 0.25)
-    assert row.on_grid.area_m2 == 0.0
+    assert row.driven["min_distance_m"] == pytest.approx(row.center_distance_m - 0.25)
+    assert row.on_grid["area_m2"] == 0.0
 
 
 def test_the_declared_nominal_line_counts():
     raised = np.array([[0.15, 1.25], [3.85, 1.25]])
     plain, declared = measured([trial(STRAIGHT, 1), trial(STRAIGHT, 2, nominal_m=raised)])
-    assert plain.driven.area_m2 == pytest.approx(0.0)
-    assert declared.driven.area_m2 == pytest.approx(3.7 * 0.2)
+    assert plain.driven["area_m2"] == pytest.approx(0.0)
+    assert declared.driven["area_m2"] == pytest.approx(3.7 * 0.2)
 
 
 def test_groups_leave_trials_without_people_out():
@@ -87,9 +87,9 @@ def test_groups_leave_trials_without_people_out():
     assert [one.group for one in groups] == ["force, cycle 2", "joystick", "obstacle avoidance"]
     force = groups[0]
     assert (force.driven.count, force.participants) == (2, 1)
-    lengths = [rows[0].driven.length_m, rows[1].driven.length_m]
-    assert force.driven.mean.length_m == pytest.approx(np.mean(lengths))
-    assert force.driven.std.length_m == pytest.approx(np.std(lengths, ddof=1))
+    lengths = [rows[0].driven["length_m"], rows[1].driven["length_m"]]
+    assert force.driven.mean["length_m"] == pytest.approx(np.mean(lengths))
+    assert force.driven.std["length_m"] == pytest.approx(np.std(lengths, ddof=1))
     # The straight path never leaves the nominal one: only the other has an onset.
     assert force.onset_m[0] == pytest.approx(rows[1].onset_m)
     assert np.isnan(force.onset_m[1])
@@ -103,10 +103,10 @@ def test_participants_count_with_their_means():
         trial(AROUND, 2, participant="p3"),
     ]
     rows = measured(trials)
-    found = by_participant(rows, "force, cycle 2", lambda row: row.driven.length_m)
-    straight, around = rows[0].driven.length_m, rows[1].driven.length_m
+    found = by_participant(rows, "force, cycle 2", lambda row: row.driven["length_m"])
+    straight, around = rows[0].driven["length_m"], rows[1].driven["length_m"]
     assert found == pytest.approx({"p1": (straight + around) / 2, "p2": around, "p3": around})
-    assert by_participant(rows, "joystick", lambda row: row.driven.length_m) == {}
+    assert by_participant(rows, "joystick", lambda row: row.driven["length_m"]) == {}
     assert set(by_participant(rows, "force, cycle 2", lambda row: row.onset_m)) == {"p1", "p2", "p3"}
 
 

@@ -1,10 +1,6 @@
-"""``navirl evaluate``: path properties of demonstrated, learnt and baseline paths."""
+"""``navirl evaluate``: what demonstrated, learnt and baseline paths are like, and how groups of them differ."""
 
-import csv
-import io
-from collections.abc import Mapping
-from dataclasses import asdict
-from math import isfinite
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +8,11 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.commands.evaluate_report import METRICS_HEADER, document, metric_rows, tables
+from navirl_cli.commands.formats import ENDINGS, Format, formatted
 from navirl_cli.commands.shared import (
     FilePath,
+    Number,
     demonstrations_in,
     demos_argument,
     echo_json,
@@ -22,131 +21,184 @@ from navirl_cli.commands.shared import (
     json_option,
     output_option,
     progress_bar,
-    samples_option,
     seed_option,
-    text_table,
 )
-from navirl_cli.errors import ArtefactError
-from navirl_cli.evaluation.compare import KINDS, Comparison, compare
-from navirl_cli.evaluation.metrics import METRICS, PathMetrics
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import ArtefactError, DemonstrationError
+from navirl_cli.evaluation.compare import FIELDS, compare
+from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
+from navirl_cli.evaluation.pairs import pairs_of
+from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import check_writable, replacing
+from navirl_cli.irl.reward import Reward
+
+
+class Names(click.ParamType):  # type: ignore[type-arg]
+    """Metrics by name, parted by commas; or all."""
+
+    name = "names"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Metric, ...]:
+        """Look the names up."""
+        if not isinstance(value, str):
+            return tuple(value)
+        if value == "all":
+            return tuple(BY_NAME.values())
+        names = [name.strip() for name in value.split(",")]
+        if unknown := [name for name in names if name not in BY_NAME]:
+            self.fail(f"unknown metric {unknown[0]!r}; navirl evaluate --list-metrics lists them", param, ctx)
+        return tuple(BY_NAME[name] for name in dict.fromkeys(names))
+
+
+def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
+    """Print all metrics and end."""
+    if value:
+        click.echo(formatted(METRICS_HEADER, metric_rows(), Format.TEXT))
+        ctx.exit()
 
 
 @click.command()
 @demos_argument
-@click.option("--reward", type=FilePath, help="Learnt reward, to measure paths drawn from its policy.")
-@samples_option
+@click.option(
+    "--reward",
+    "rewards",
+    multiple=True,
+    type=FilePath,
+    help="Learnt reward, to measure the paths that its policy takes; repeatable, side by side in one table.",
+)
+@click.option(
+    "--metrics",
+    default=PAPER_METRICS,
+    type=Names(),
+    help="Names parted by commas, or all.  [default: length_m,min_distance_m,area_m2]",
+)
+@click.option(
+    "--list-metrics",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_list_metrics,
+    help="List all metrics with unit, definition and source.",
+)
+@click.option(
+    "--by",
+    "fields",
+    multiple=True,
+    type=click.Choice(list(FIELDS)),
+    help="Group by this; repeatable.  [default: condition, cycle and set]",
+)
+@click.option(
+    "--pair",
+    "pairs",
+    multiple=True,
+    nargs=2,
+    metavar="GROUP OTHER",
+    help="Compare the driven paths of two groups by participant; repeatable.",
+)
+@click.option("--ranks", is_flag=True, help="Rank demonstrations among the policy's paths: are they typical of it?")
+@click.option(
+    "--samples",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(2, MOST),
+    help="Paths drawn from a learnt policy in each scene.",
+)
+@click.option(
+    "--precision",
+    type=Number(1e-3, 1),
+    help="Draw until the Monte Carlo error of each expected value is below this share of it, or of its spread.",
+)
 @seed_option
+@click.option(
+    "--format",
+    "style",
+    type=click.Choice([how.value for how in Format]),
+    default=Format.TEXT.value,
+    show_default=True,
+    help="How to print.",
+)
 @json_option
-@click.option("--csv", "as_csv", is_flag=True, help="Print CSV in place of the table.")
-@output_option("Write the results as .json or .csv too.", required=False)
+@output_option("Write the results too: .json, .csv, .md or .tex.", required=False)
 @force_option
 def evaluate(
     demos: Path,
-    reward: Path | None,
+    rewards: tuple[Path, ...],
+    metrics: tuple[Metric, ...],
+    fields: tuple[str, ...],
+    pairs: tuple[tuple[str, str], ...],
+    ranks: bool,
     samples: int,
+    precision: float | None,
     seed: int,
+    style: str,
     as_json: bool,
-    as_csv: bool,
     output: Path | None,
     force: bool,
 ) -> None:
-    """Measure demonstrated, learnt and baseline paths.
+    """Measure demonstrated, learnt and baseline paths, and how groups of them differ.
 
-    Mean and standard deviation, by condition and cycle, of length, least distance between the robot's shell and a
-    person's centre, and area between path and nominal path.
+    Mean and standard deviation by group of every metric asked for: of driven paths over demonstrations, of learnt
+    paths over the policy. Distances are from the robot's shell to people's centres. What visits of the policy give
+    exactly (length, heading change, way in zones) is exact; the rest are means over drawn paths.
     """
     import numpy as np
 
-    if as_json and as_csv:
-        raise click.UsageError("--json and --csv exclude each other.")
+    if ranks and len(rewards) != 1:
+        raise click.UsageError("--ranks needs one --reward.")
     if output is not None:
         _check_output(output, force=force)
     demonstrations = demonstrations_in(demos)
-    learnt = None if reward is None else read_reward_for(reward, demonstrations).reward
+    learnt = _rewards(rewards, demonstrations)
+    rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
-            demonstrations, learnt, samples, np.random.default_rng(seed), lambda done, _all: update(done, "")
+            demonstrations,
+            learnt,
+            Precision(samples, precision),
+            rng,
+            fields=fields,
+            progress=lambda done, _all: update(done, ""),
         )
-    inputs = [Input.of(path) for path in (demos, reward) if path is not None]
-    document = _document(result, inputs, samples if reward else 0, seed)
-    if output is not None and output.suffix == ".json":
-        write_json(output, "metrics", document, force=force)
-    elif output is not None:
-        with replacing(output, force=force) as temporary:
-            temporary.write_text(_csv(result), encoding="utf-8", newline="")
-    if as_json:
-        echo_json(document)
+    compared = [(one, other, pairs_of(result.driven, one, other, metrics, rng)) for one, other in pairs]
+    ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
+    inputs = [Input.of(path) for path in (demos, *rewards)]
+    content = document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)
+    if output is not None:
+        _write(output, content, tables(result, compared, ranked, metrics, ENDINGS[output.suffix]), force=force)
+    if as_json or style == Format.JSON:
+        echo_json(content)
     else:
-        click.echo(_csv(result) if as_csv else _table(result), nl=not as_csv)
+        click.echo(tables(result, compared, ranked, metrics, Format(style)))
     finish(result.notes)
+
+
+def _rewards(paths: Sequence[Path], demonstrations: list[Demonstration]) -> dict[str, Reward]:
+    """Learnt rewards by the names of their files.
+
+    Raises:
+        DemonstrationError: Two files have one name.
+    """
+    learnt: dict[str, Reward] = {}
+    for path in paths:
+        if path.stem in learnt:
+            raise DemonstrationError(f"{path}: another --reward is called {path.stem!r} too; rename one of the files")
+        learnt[path.stem] = read_reward_for(path, demonstrations).reward
+    return learnt
 
 
 def _check_output(output: Path, *, force: bool) -> None:
     """Refuse early what cannot be written."""
-    if output.suffix not in {".json", ".csv"}:
-        raise ArtefactError(f"{output}: expected a name that ends in .json or .csv, found {output.suffix!r}")
+    if output.suffix not in ENDINGS:
+        known = ", ".join(ENDINGS)
+        raise ArtefactError(f"{output}: expected a name that ends in one of {known}, found {output.suffix!r}")
     check_writable(output, force=force)
 
 
-def _values(metrics: PathMetrics) -> dict[str, float | None]:
-    """Metrics for JSON, which knows no NaN."""
-    return {name: float(value) if isfinite(value) else None for name, value in asdict(metrics).items()}
-
-
-def _document(result: Comparison, inputs: list[Input], samples: int, seed: int) -> Mapping[str, Any]:
-    """The content of a metrics file."""
-    return {
-        "inputs": [vars(one) for one in inputs],
-        "samples": samples,
-        "seed": seed,
-        "groups": [
-            {
-                "group": row.group,
-                "paths": row.kind,
-                "count": row.count,
-                "mean": _values(row.mean),
-                "standard_deviation": _values(row.std),
-            }
-            for row in result.groups
-        ],
-        "demonstrations": [
-            {"id": name, "group": group, "metrics": _values(metrics)} for name, group, metrics in result.driven
-        ],
-    }
-
-
-def _csv(result: Comparison) -> str:
-    """One line a group and kind of path."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    names = [metric.name for metric in METRICS]
-    writer.writerow(["group", "paths", "n", *(f"{name}_{part}" for name in names for part in ("mean", "std"))])
-    for row in result.groups:
-        numbers = [getattr(part, name) for name in names for part in (row.mean, row.std)]
-        writer.writerow([row.group, row.kind, row.count, *(f"{n:.6g}" if isfinite(n) else "" for n in numbers)])
-    return stream.getvalue()
-
-
-def _table(result: Comparison) -> str:
-    """The same as text, with what the words mean below."""
-    header = ("group", "paths", "n", *(f"{metric.label} {metric.unit}" for metric in METRICS))
-    rows = [
-        (
-            row.group,
-            row.kind,
-            str(row.count),
-            *(_mean_and_spread(getattr(row.mean, m.name), getattr(row.std, m.name)) for m in METRICS),
-        )
-        for row in result.groups
-    ]
-    used = [kind for kind in KINDS if any(row.kind == kind for row in result.groups)]
-    legend = [f"{kind}: {KINDS[kind]}" for kind in used]
-    meaning = [f"{metric.label}: {metric.definition}" for metric in METRICS]
-    return "\n".join((text_table(header, rows), "", "mean ± standard deviation over n paths", *meaning, *legend))
-
-
-def _mean_and_spread(mean: float, spread: float) -> str:
-    if not isfinite(mean):
-        return "-"
-    return f"{mean:.3f}" + (f" ± {spread:.3f}" if isfinite(spread) else "")
+def _write(output: Path, content: dict[str, Any], text: str, *, force: bool) -> None:
+    """The results in the format of the file's ending."""
+    if ENDINGS[output.suffix] is Format.JSON:
+        write_json(output, "metrics", content, force=force)
+        return
+    with replacing(output, force=force) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8", newline="")

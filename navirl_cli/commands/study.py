@@ -1,7 +1,7 @@
 """``navirl study``: the paper's evaluation over the logs of a whole study."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from navirl_cli.artefacts.store import Input, write_json
 from navirl_cli.commands.extraction import all_extracted
 from navirl_cli.commands.shared import (
     FilePath,
+    demonstrations_in,
     echo_json,
     finish,
     force_option,
@@ -25,6 +26,7 @@ from navirl_cli.commands.shared import (
     topic_option,
     topics_by_role,
 )
+from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
 from navirl_cli.files import check_writable, make_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
@@ -65,39 +67,41 @@ def study(
 ) -> None:
     """Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.
 
-    LOG is what navirl extract takes; its metadata record navirl.session says participant, and condition and cycle of
-    each trial, as in logs that navirl import-study and navirl simulate write. A log needs no wrench.
+    LOG is a log, as navirl extract takes it; its metadata record navirl.session says participant, and condition and
+    cycle of each trial, as in logs that navirl import-study and navirl simulate write. A log needs no wrench. Where
+    logs want options of navirl extract, extract them first, and give its demos.json in place of them.
 
     Each participant's first cycle is fitted from the study's initial parameters, the second from the first's result,
     and all second cycles together. Writes report.md, report.html (the same in one file), summary.json (every number of
     the tables), demos.json and figures/.
     """
     from navirl_cli.figures.study import draw_study
+    from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
+    from navirl_cli.study.remarks import remarks
     from navirl_cli.study.summary import study_document
     from navirl_cli.study.text import FIGURES, Told
 
-    bars = [] if questionnaire is None else shares(read_answers(questionnaire, levels), levels)
+    answers = [] if questionnaire is None else read_answers(questionnaire, levels)
+    bars = shares(answers, levels)
     figures = _folder(output, force=force)
-    options = LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL)
-    good, failed = all_extracted(logs, ExtractSettings(), options, join=False)
-    results = [result for _, result in good]
-    demonstrations = numbered(results)
-    cells = {f"{one.log}: {name}": same for one in results for name, same in one.published.items()}
-    with progress_bar("fit", len({one.participant for one in demonstrations}) + 1) as update:
-        found = study_of(demonstrations, _completion(results), samples, seed, published=bool(cells), progress=update)
-    inputs = [*(file for files, _ in good for file in files), *map(Input.of, filter(None, [questionnaire]))]
+    given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
+    demonstrations = given.demonstrations
+    with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
+        found = study_of(demonstrations, given.completion_s, samples, seed, published=given.published, progress=update)
+    inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
     settings = {"samples": samples, "seed": seed, "levels": levels}
-    document = {"inputs": [vars(one) for one in inputs], "settings": settings, **study_document(found, cells)}
+    numbers = study_document(found, given.cells, bars)
+    document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
     write_json(output / SUMMARY, "study", document, force=force)
     kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
     write_json(output / DEMOS, "demonstrations", kept, force=force)
     with progress_bar("draw", len(FIGURES)) as update:
         drawn, missing = draw_study(found, bars, figures, force=force, progress=update)
-    lost = [*failed, *(line for one in results for line in (*one.damage, *one.skipped)), *_trouble(found), *missing]
-    notes = merged(note for one in results for note in one.notes)
-    told = Told([one.log for one in results], [*notes, *lost], cells, drawn, samples, seed)
+    lost = [*given.lost, *(line for one in (*found.participants, found.pooled) for line in one.trouble), *missing]
+    notes = [*merged(given.notes), *remarks(demonstrations, answers)]
+    told = Told(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
     _write_report(output, found, told, force=force)
     if as_json:
         echo_json(document)
@@ -106,6 +110,47 @@ def study(
     for line in notes:
         say(line)
     finish(lost)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What the user gave, read."""
+
+    demonstrations: list[Demonstration]
+    logs: list[str]
+    inputs: list[Input]
+    #: Times in which the course was completed, s, by modality and participant.
+    completion_s: dict[str, dict[str, tuple[float, ...]]]
+    #: Published paths and whether our cells are the same, and whose they are.
+    cells: list[tuple[str, bool]]
+    published: set[str]
+    #: What is odd ("name: text"), and what was lost.
+    notes: list[str]
+    lost: list[str]
+
+
+def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
+    """Logs extracted, or the demonstrations of a file that extract wrote."""
+    if len(logs) == 1 and logs[0].suffix == ".json":
+        demonstrations = demonstrations_in(logs[0])
+        notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
+        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, [])
+    good, failed = all_extracted(logs, ExtractSettings(), options, join=False)
+    results = [result for _, result in good]
+    demonstrations = numbered(results)
+    return _Given(
+        demonstrations,
+        [one.log for one in results],
+        [file for files, _ in good for file in files],
+        _completion(results),
+        [(f"{one.log}: {name}", same) for one in results for name, same in one.published.items()],
+        {one.demonstrations[0].participant for one in results if one.published},
+        [
+            *(note for one in results for note in one.notes),
+            *(f"{one.id}: {note}" for one in demonstrations for note in one.notes),
+        ],
+        [*failed, *(line for one in results for line in (*one.damage, *one.skipped))],
+    )
 
 
 def _folder(output: Path, *, force: bool) -> Path:
@@ -135,11 +180,6 @@ def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[floa
     return times
 
 
-def _trouble(study: "Study") -> list[str]:
-    """What could not be learnt."""
-    return [line for one in (*study.participants, study.pooled) for line in one.trouble]
-
-
 def _write_report(output: Path, study: "Study", told: "Told", *, force: bool) -> None:
     """The report as Markdown and as one page."""
     from navirl_cli.reports.markdown import to_markdown
@@ -160,5 +200,5 @@ def _overview(study: "Study", told: "Told") -> str:
     table = rewards_table(study)
     lines = [text_table(table.header, table.rows), "", *claims_lines(study.claims)]
     if told.cells:
-        lines += ["", f"cells as published: {sum(told.cells.values())} of {len(told.cells)} paths"]
+        lines += ["", f"cells as published: {sum(same for _, same in told.cells)} of {len(told.cells)} paths"]
     return "\n".join(lines)

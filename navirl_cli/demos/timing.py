@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.demos.lines import divided
 from navirl_cli.errors import DemonstrationError
 
 #: The driven line is looked at in pieces no longer than this share of a cell.
@@ -35,7 +36,7 @@ def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid)
             f"times of cells need at least two poses, as many times, and two cells; "
             f"found {len(xy_m)}, {len(t_s)} and {len(cells)}"
         )
-    line, times = _divided(xy_m, t_s, PIECE * grid.resolution_m)
+    line, times = divided(xy_m, t_s, PIECE * grid.resolution_m)
     centres = grid.centres_of(cells)
     # least[j, i]: of the first j + 1 cells when the last of them is at point i or before; the first is at the start.
     least = np.empty((len(cells), len(line)))
@@ -71,15 +72,3 @@ def steps_in_contact(demonstration: Demonstration) -> NDArray[np.bool_]:
     for contact in d.contacts:
         pushed |= (times[1:] >= contact.start_s) & (times[:-1] <= contact.end_s)
     return pushed
-
-
-def _divided(xy_m: FloatArray, t_s: FloatArray, longest_m: float) -> tuple[FloatArray, FloatArray]:
-    """A timed line with points so dense that no piece is longer than a length; its own points stay."""
-    length = np.hypot(*np.diff(xy_m, axis=0).T)
-    pieces = np.maximum(np.ceil(length / longest_m), 1).astype(np.int64)
-    segment = np.repeat(np.arange(len(pieces)), pieces)
-    share = (np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[segment]
-    place = np.append(segment + share, len(pieces))
-    numbers = np.arange(len(t_s))
-    line = np.stack([np.interp(place, numbers, axis) for axis in xy_m.T], axis=1)
-    return line, np.interp(place, numbers, t_s)

@@ -16,6 +16,8 @@ WINDOW_S = 0.5
 ARRIVED_M = 0.5
 #: A goal this near to the present one is the same goal said again, m.
 SAME_GOAL_M = 0.05
+#: A trial of the session record this near in time is the one that starts here, s.
+SAME_START_S = 1.0
 #: A rest of this length parts two trials for --split stop, s.
 REST_S = 1.0
 #: A trial that covers less is none, m.
@@ -132,10 +134,12 @@ def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], g
 
 def _said_stop(recording: Recording, first: int, border: int) -> int | None:
     """One past the last pose of the trial that starts with a pose, where the session record says when it ended."""
-    for entry in recording.session.declared:
-        if entry.stop_ns is not None and np.searchsorted(recording.t_ns, entry.t_ns) == first:
-            return int(np.clip(np.searchsorted(recording.t_ns, entry.stop_ns, side="right"), first + 2, border))
-    return None
+    start_ns = int(recording.t_ns[first])
+    ended = [entry for entry in recording.session.declared if entry.stop_ns is not None]
+    entry = min(ended, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
+    if entry is None or entry.stop_ns is None or abs(entry.t_ns - start_ns) > SAME_START_S * 1e9:
+        return None
+    return int(np.clip(np.searchsorted(recording.t_ns, entry.stop_ns, side="right"), first + 2, border))
 
 
 def _has_left(distance: FloatArray) -> BoolArray:

@@ -1,16 +1,17 @@
 """Demonstrated paths against learnt ones and against paths that know nothing of people's wishes."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.metrics import PathMetrics, path_metrics
-from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.paths import sample_paths, sampled_lines_m
+from navirl_cli.evaluation.drawn import Drawn, Precision, draw
+from navirl_cli.evaluation.metrics import METRICS, Values, line_values
+from navirl_cli.evaluation.motion import contact_values, motion_values
+from navirl_cli.evaluation.nearness import nearness
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
 
@@ -18,13 +19,20 @@ from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
 PERSON_RADIUS_M = 0.25
 
 DRIVEN, ON_GRID, LEARNT, NOMINAL, AVOIDANCE = "driven", "driven, on grid", "learnt", "nominal", "avoidance"
-#: What each kind of path is, in the order of the tables.
+#: What each kind of path is, in the order of the tables; several rewards have "learnt, NAME" each.
 KINDS: dict[str, str] = {
     DRIVEN: "the demonstrated poses",
     ON_GRID: "the demonstrated path through the centres of its cells, comparable with learnt paths",
     LEARNT: "paths drawn from the learnt policy, through the centres of cells",
     NOMINAL: "the line that the log says the navigation followed, else the shortest way on the map without people",
     AVOIDANCE: "the shortest way on the grid around people as obstacles of radius 0.25 m",
+}
+#: By what demonstrations can be grouped.
+FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
+    "condition": lambda one: one.condition.value,
+    "cycle": lambda one: "no cycle" if one.cycle is None else f"cycle {one.cycle}",
+    "set": lambda one: one.set or "main task",
+    "participant": lambda one: one.participant,
 }
 
 
@@ -34,10 +42,25 @@ class GroupMetrics:
 
     group: str
     kind: str
+    #: Number of demonstrations.
     count: int
-    mean: PathMetrics
-    #: Sample standard deviation (n - 1); NaN for one path.
-    std: PathMetrics
+    mean: Values
+    #: Sample standard deviation (n - 1) over demonstrations, or of one path under the policy; NaN for one path.
+    std: Values
+    #: Of learnt paths: Monte Carlo standard error of the mean.
+    error: Values = field(default_factory=dict)
+    #: Of learnt paths: exact expected values, where visits give them.
+    exact: Values = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What was measured of one demonstration as driven."""
+
+    id: str
+    participant: str
+    group: str
+    values: Values
 
 
 @dataclass(frozen=True)
@@ -45,26 +68,27 @@ class Comparison:
     """All metrics of a set of demonstrations."""
 
     groups: tuple[GroupMetrics, ...]
-    #: By demonstration: id, group, and the metrics of the driven path.
-    driven: tuple[tuple[str, str, PathMetrics], ...]
+    driven: tuple[Driven, ...]
     #: What could not be measured, and why.
     notes: tuple[str, ...]
 
 
-def by_group(demonstrations: Iterable[Demonstration]) -> dict[str, list[Demonstration]]:
+def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
     """Demonstrations by group: force first, by cycle, then joystick, then autonomous; special sets after the rest."""
     order = list(Condition)
     groups: dict[str, list[Demonstration]] = {}
     for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.set or "", one.cycle or 0)):
-        groups.setdefault(group_of(one), []).append(one)
+        groups.setdefault(group_of(one, fields), []).append(one)
     return groups
 
 
-def group_of(demonstration: Demonstration) -> str:
-    """The group of a demonstration: its condition, its cycle and its set where known.
+def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
+    """The group of a demonstration: its condition, its cycle and its set where known, or what fields of FIELDS say.
 
     A robot that drives by itself is what its set says: "obstacle avoidance".
     """
+    if fields:
+        return ", ".join(of(demonstration) for name, of in FIELDS.items() if name in fields)
     alone = demonstration.condition is Condition.AUTONOMOUS and demonstration.set is not None
     condition = [] if alone else [demonstration.condition.value]
     cycle = [] if demonstration.cycle is None else [f"cycle {demonstration.cycle}"]
@@ -73,18 +97,21 @@ def group_of(demonstration: Demonstration) -> str:
 
 def compare(
     demonstrations: Sequence[Demonstration],
-    reward: Reward | None,
-    samples: int,
+    rewards: Mapping[str, Reward],
+    precision: Precision,
     rng: np.random.Generator,
+    *,
+    fields: Collection[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Comparison:
     """Measure demonstrations and, in the same scenes, learnt and baseline paths.
 
     Args:
         demonstrations: What was driven.
-        reward: A learnt reward, or None.
-        samples: Paths to draw from its policy for every demonstration.
+        rewards: Learnt rewards by name; none to measure no learnt paths.
+        precision: How many paths to draw from a policy in each scene.
         rng: Source of randomness.
+        fields: Names of FIELDS to group by; none for condition, cycle and set.
         progress: Called with demonstrations done and in all.
 
     Returns:
@@ -92,55 +119,97 @@ def compare(
 
     Raises:
         SceneError: A demonstration's scene has no way.
-        InfinitePartitionError: The reward has no policy in a scene.
+        InfinitePartitionError: A reward has no policy in a scene.
     """
-    collected: dict[tuple[str, str], list[PathMetrics]] = {}
-    driven: list[tuple[str, str, PathMetrics]] = []
+    lines: dict[tuple[str, str], list[Values]] = {}
+    learnt: dict[tuple[str, str], list[tuple[Drawn, dict[str, FloatArray]]]] = {}
+    known: dict[tuple[str, int, float], Drawn] = {}
+    rows: list[Driven] = []
     notes: list[str] = []
-    for number, (demonstration, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
-        group = group_of(demonstration)
-        lines = _lines(demonstration, scene, notes)
-        if reward is not None and samples:
-            policy = policy_of(reward, scene)
-            lines[LEARNT] = sampled_lines_m(policy, sample_paths(policy, scene.start, samples, rng))
-        nominal = lines[NOMINAL][0]
-        for kind, paths in lines.items():
-            measured = [
-                path_metrics(line, nominal, demonstration.people_m, demonstration.robot_radius_m) for line in paths
-            ]
-            collected.setdefault((group, kind), []).extend(measured)
+    for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
+        group = group_of(one, fields)
+        paths = _lines(one, scene, notes)
+        nominal = paths[NOMINAL]
+        for kind, line in paths.items():
+            values = line_values(line, nominal, one.people_m, one.robot_radius_m)
             if kind == DRIVEN:
-                driven.append((demonstration.id, group, measured[0]))
+                values = {**values, **motion_values(one), **contact_values(one)}
+                rows.append(Driven(one.id, one.participant, group, values))
+            lines.setdefault((group, kind), []).append(values)
+        for name, reward in rewards.items():
+            key = (name, id(scene), one.robot_radius_m)
+            if key not in known:
+                known[key] = draw(reward, scene, nominal, one.robot_radius_m, precision, rng)
+            near = nearness(paths[ON_GRID], known[key].paths, scene.lattice)
+            kind = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
+            learnt.setdefault((group, kind), []).append((known[key], near))
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    order = list(by_group(demonstrations))
-    ordered = sorted(collected, key=lambda key: (order.index(key[0]), list(KINDS).index(key[1])))
-    groups = tuple(summary_of(group, kind, collected[group, kind]) for group, kind in ordered)
-    return Comparison(groups, tuple(driven), tuple(notes))
+    groups = [summary_of(group, kind, values) for (group, kind), values in lines.items()]
+    groups += [_learnt(group, kind, members) for (group, kind), members in learnt.items()]
+    order = list(by_group(demonstrations, fields))
+    groups.sort(key=lambda row: (order.index(row.group), _place(row.kind), row.kind))
+    return Comparison(tuple(groups), tuple(rows), tuple(notes))
 
 
-def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict[str, list[FloatArray]]:
-    """The lines of every kind but the learnt."""
+def _place(kind: str) -> int:
+    """A kind's place in the tables."""
+    return list(KINDS).index(kind if kind in KINDS else LEARNT)
+
+
+def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict[str, FloatArray]:
+    """The line of every kind but the learnt."""
     lines = {
-        DRIVEN: [demonstration.xy_m],
-        ON_GRID: [demonstration.grid.centres_of(demonstration.cells)],
-        NOMINAL: [scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m],
+        DRIVEN: demonstration.xy_m,
+        ON_GRID: demonstration.grid.centres_of(demonstration.cells),
+        NOMINAL: scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m,
     }
     try:
         clearance = demonstration.robot_radius_m + PERSON_RADIUS_M
-        lines[AVOIDANCE] = [avoidance_line_m(scene, clearance)]
+        lines[AVOIDANCE] = avoidance_line_m(scene, clearance)
     except SceneError as error:
         notes.append(f"{demonstration.id}: no path around the people as obstacles: {error}")
     return lines
 
 
-def summary_of(group: str, kind: str, measured: Iterable[PathMetrics]) -> GroupMetrics:
+def summary_of(group: str, kind: str, measured: Iterable[Values]) -> GroupMetrics:
     """Mean and standard deviation over the paths that have a value (distance to people needs people)."""
     mean, spread = {}, {}
     paths = list(measured)
-    for name in (field.name for field in fields(PathMetrics)):
-        values = np.array([getattr(one, name) for one in paths])
+    for metric in METRICS:
+        values = np.array([one[metric.name] for one in paths if metric.name in one])
         values = values[np.isfinite(values)]
-        mean[name] = float(values.mean()) if len(values) else np.nan
-        spread[name] = float(values.std(ddof=1)) if len(values) > 1 else np.nan
-    return GroupMetrics(group, kind, len(paths), PathMetrics(**mean), PathMetrics(**spread))
+        if any(metric.name in one for one in paths):
+            mean[metric.name] = float(values.mean()) if len(values) else float("nan")
+            spread[metric.name] = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
+    return GroupMetrics(group, kind, len(paths), mean, spread)
+
+
+def _learnt(group: str, kind: str, members: Sequence[tuple[Drawn, dict[str, FloatArray]]]) -> GroupMetrics:
+    """Expected values over the scenes of a group, each as often as it was demonstrated in."""
+    scenes: dict[int, list[tuple[Drawn, dict[str, FloatArray]]]] = {}
+    for member in members:
+        scenes.setdefault(id(member[0]), []).append(member)
+    mean, spread, error, exact = {}, {}, {}, {}
+    share = np.array([len(own) / len(members) for own in scenes.values()])
+    for metric in METRICS:
+        name = metric.name
+        if name not in (members[0][0].values | members[0][1]):
+            continue
+        # Demonstrations of one scene share its paths, so that they share the error too.
+        every = [[(drawn.values | near)[name] for drawn, near in own] for own in scenes.values()]
+        known = np.isfinite([np.mean(own) for own in every])  # distances need people
+        if not known.any():
+            mean[name] = spread[name] = error[name] = float("nan")
+            continue
+        every = [own for own, one in zip(every, known, strict=True) if one]
+        weight = share[known] / share[known].sum()
+        mean[name] = float(weight @ [np.mean(own) for own in every])
+        second = float(weight @ [np.mean(np.square(own)) for own in every])
+        spread[name] = float(np.sqrt(max(second - mean[name] ** 2, 0.0)))
+        errors = np.array([np.mean(own, axis=0).std(ddof=1) / np.sqrt(len(own[0])) for own in every])
+        error[name] = float(np.sqrt(weight**2 @ errors**2))
+        values = [drawn.exact[name] for drawn, _ in members if np.isfinite(drawn.exact.get(name, np.nan))]
+        if values:
+            exact[name] = float(np.mean(values))
+    return GroupMetrics(group, kind, len(members), mean, spread, error, exact)

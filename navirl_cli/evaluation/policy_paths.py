@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.demos.grid import MOVES, FloatArray, IntArray
+from navirl_cli.evaluation.metrics import areas_m2
 from navirl_cli.evaluation.segments import ZONES, Segments, segments
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.paths import SampledPaths
@@ -48,8 +49,10 @@ class Steps:
         """
         flow = policy.visits(np.eye(1, self.lattice.size, start)[0])[:, None] * policy.probability
         found = {"length_m": float((flow * self.lattice.step_m).sum())}
+        nobody = bool(np.isnan(self.segments.least_m).all())
         for number, (name, _) in enumerate(ZONES):
-            found[f"{name}_m"] = float((flow * self.segments.zones_m[..., number]).sum())
+            way = float((flow * self.segments.zones_m[..., number]).sum())
+            found[f"{name}_m"] = float("nan") if nobody else way
         # The next move is drawn in the state where this one ends; none is in the goal.
         turns = policy.probability @ _TURN.T
         possible = flow > 0
@@ -67,9 +70,14 @@ class Steps:
             nominal_m: (k, 2) m.
 
         Returns:
-            (paths,) values by name.
+            (paths,) values by name: all that follow from a line and the people.
         """
-        return additive(self, paths) | {"area_m2": areas_m2(self.lattice.xy_m[paths.states], nominal_m)}
+        found = additive(self, paths)
+        length = found["length_m"]
+        found["area_m2"] = areas_m2(self.lattice.xy_m[paths.states], nominal_m)
+        found["curvature_1_m"] = found["heading_rad"] / length
+        found["compliance"] = 1 - found["intimate_m"] / length
+        return found | {f"{name}_share": found[f"{name}_m"] / length for name, _ in ZONES}
 
 
 def moves_of(lattice: Lattice, states: IntArray) -> IntArray:
@@ -100,27 +108,12 @@ def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
         "mean_distance_m": total(parts.distance_m2) / length,
         "heading_rad": turned,
     }
-    if np.isnan(parts.least_m).all():
-        found["min_distance_m"] = found["mean_distance_m"] = np.full(len(length), np.nan)
     for number, (name, _) in enumerate(ZONES):
         found[f"{name}_m"] = total(parts.zones_m[..., number])
+    if np.isnan(parts.least_m).all():  # nobody is there
+        about_people = ("min_distance_m", "mean_distance_m", *(f"{name}_m" for name, _ in ZONES))
+        found |= dict.fromkeys(about_people, np.full(len(length), np.nan))
     return found
-
-
-def areas_m2(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
-    """Areas between many lines and a nominal one, as :func:`navirl_cli.evaluation.metrics.area_between_m2` of each.
-
-    Args:
-        lines_m: (m, n, 2) m; a line may rest at its end.
-        nominal_m: (k, 2) m.
-    """
-    import shapely
-
-    back = np.broadcast_to(nominal_m[::-1], (len(lines_m), *nominal_m.shape))
-    rings = np.concatenate([lines_m, back, lines_m[:, :1]], axis=1)
-    faces = shapely.polygonize(shapely.node(shapely.linestrings(rings))[:, None])
-    area: FloatArray = shapely.area(faces)
-    return area
 
 
 def standard_errors(values: Mapping[str, FloatArray]) -> dict[str, float]:

@@ -89,3 +89,11 @@ def sampled_log_likelihoods(policy: Policy, paths: SampledPaths) -> FloatArray:
         moves = (policy.lattice.neighbours[here[driving, step]] == after[driving, step, None]).argmax(axis=1)
         total[driving] += logs[here[driving, step], moves]
     return total
+
+
+def uniformity(ranks: Sequence[Rank]) -> tuple[float, float]:
+    """Kolmogorov and Smirnov's distance of ranks from the uniform, and its exact p-value."""
+    from scipy.stats import kstest
+
+    found = kstest([one.rank for one in ranks], "uniform")
+    return float(found.statistic), float(found.pvalue)

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.metrics import METRICS, Metric, PathMetrics
+from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
 from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
 
 #: What the figure says of itself.
@@ -39,9 +39,9 @@ class PropertyBar:
     label: str
     #: Key of its colour, as :func:`navirl_cli.figures.style.colour_of` takes it.
     key: str
-    mean: PathMetrics
+    mean: Values
     #: Standard deviations; NaN where one path has none.
-    std: PathMetrics
+    std: Values
     #: Number of paths.
     count: int
 
@@ -62,7 +62,7 @@ def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
         width_in: Width of the figure, inches.
     """
     most = max((_label(bar, width_in).count("\n") + 1 for bar in bars), default=1)
-    below = _BELOW_IN + (_LINE_IN if width_in / len(METRICS) < _NARROW_IN else 0.0)
+    below = _BELOW_IN + (_LINE_IN if width_in / len(PAPER_METRICS) < _NARROW_IN else 0.0)
     return below + len(bars) * (most * _LINE_IN + _BETWEEN_IN)
 
 
@@ -74,7 +74,7 @@ def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnP
     where there is nobody) is said to be missing.
 
     Args:
-        axes: One for each of METRICS, side by side, :func:`height_for` inches high with their labels. The first names
+        axes: One for each of PAPER_METRICS, side by side, :func:`height_for` inches high with labels. The first names
             the bars and their numbers of paths.
         bars: From top to bottom.
 
@@ -86,7 +86,7 @@ def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnP
     """
     if not bars:
         raise DemonstrationError("no paths to compare")
-    drawn = [_draw_panel(panel, metric, bars) for panel, metric in zip(axes, METRICS, strict=True)]
+    drawn = [_draw_panel(panel, metric, bars) for panel, metric in zip(axes, PAPER_METRICS, strict=True)]
     width_in = panel_width_in(axes[0]) * len(axes)
     axes[0].set_yticks(range(len(bars)), [_label(bar, width_in) for bar in bars])
     axes[0].figure.supxlabel(NOTE, fontsize="small")
@@ -106,8 +106,8 @@ def _label(bar: PropertyBar, width_in: float) -> str:
 def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarContainer:
     """One metric."""
     at = np.arange(len(bars))
-    mean = np.array([getattr(bar.mean, metric.name) for bar in bars], dtype=float)
-    std = np.array([getattr(bar.std, metric.name) for bar in bars], dtype=float)
+    mean = np.array([bar.mean[metric.name] for bar in bars], dtype=float)
+    std = np.array([bar.std[metric.name] for bar in bars], dtype=float)
     colours = [colour_of(bar.key) for bar in bars]
     drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=INK, linewidth=0.5, error_kw=_WHISKER)
     for y in at[np.isnan(mean)]:

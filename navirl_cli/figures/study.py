@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.compare import by_group
-from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
 from navirl_cli.figures.conditions import draw_path_panels
 from navirl_cli.figures.policies import draw_policy_and_reward
@@ -23,6 +23,7 @@ from navirl_cli.irl.scene import Scene, scenes_of
 from navirl_cli.parallel import map_in_order
 from navirl_cli.study.pipeline import Study
 from navirl_cli.study.questionnaire import Shares
+from navirl_cli.study.text import FIGURES
 from navirl_cli.study.unseen import beside_obstacle, two_people
 
 #: Formats of every figure: for reports, and for papers.
@@ -46,7 +47,7 @@ def draw_study(
         study: The numbers.
         bars: Answers to a questionnaire; none where there is none.
         folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.study.text.FIGURES`.
-        force: Replace existing files.
+        force: Replace existing files; those of an earlier run that have no data now are deleted.
         progress: Called with the number of figures drawn and the name of the last.
         executor: Where to draw; by default local processes.
 
@@ -55,6 +56,9 @@ def draw_study(
     """
     notes: list[str] = []
     wanted = _wanted(study, bars, notes)
+    for name in FIGURES if force else ():
+        for extension in () if name in wanted else FORMATS:
+            (folder / f"{name}.{extension}").unlink(missing_ok=True)
     paths = {}
     for name in map_in_order(partial(_saved, folder=folder, force=force), list(wanted.items()), executor):
         paths[name] = folder / f"{name}.png"
@@ -137,7 +141,7 @@ def _properties(study: Study) -> _Drawn:
         properties.PropertyBar(one.group, one.group, one.driven.mean, one.driven.std, one.driven.count)
         for one in study.groups
     ]
-    figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(METRICS))
+    figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     return figure, False
 

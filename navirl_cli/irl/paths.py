@@ -1,4 +1,4 @@
-"""Paths of a policy: drawn all at once, and what is known of their lengths without drawing."""
+"""Paths drawn from a policy, all at once."""
 
 from dataclasses import dataclass
 
@@ -28,6 +28,15 @@ class SampledPaths:
     def path(self, number: int) -> IntArray:
         """(k,) states of one path, start and goal included."""
         return self.states[number, : self.lengths[number]]
+
+    def joined(self, others: "SampledPaths", goal: int) -> "SampledPaths":
+        """These paths and others of the same policy into the same goal."""
+        longest = max(self.states.shape[1], others.states.shape[1])
+        both = (
+            np.pad(one.states, ((0, 0), (0, longest - one.states.shape[1])), constant_values=goal)
+            for one in (self, others)
+        )
+        return SampledPaths(np.concatenate(list(both)), np.concatenate([self.lengths, others.lengths]))
 
 
 def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generator) -> SampledPaths:
@@ -72,22 +81,3 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
 def sampled_lines_m(policy: Policy, paths: SampledPaths) -> list[FloatArray]:
     """Every path as a (k, 2) line through the centres of its cells, m, map frame."""
     return [policy.lattice.xy_m[paths.path(number)] for number in range(len(paths))]
-
-
-def length_moments(policy: Policy, start: int) -> tuple[float, float]:
-    """Mean and variance of a path's length, exactly.
-
-    With L the length from a state on, E[L] and E[L^2] = E_a[l^2 + 2 l E[L'] + L'^2] solve linear systems in the policy.
-
-    Args:
-        policy: The policy.
-        start: State in which paths start.
-
-    Returns:
-        Mean, m, and variance, m^2, of the way from cell centre to cell centre into the goal.
-    """
-    step, lattice = policy.lattice.step_m, policy.lattice
-    mean = policy.expected_to_goal((policy.probability * step).sum(axis=1))
-    second = (policy.probability * (step**2 + 2 * step * mean[lattice.neighbours])).sum(axis=1)
-    square = policy.expected_to_goal(second)[start]
-    return float(mean[start]), float(max(square - mean[start] ** 2, 0.0))

@@ -18,6 +18,7 @@ MOST_OF_A_HEADER: Final = 4096
 MOST_MEMBERS: Final = 2000
 
 _GZIP: Final = b"\x1f\x8b"
+_OTHERS: Final = {b"\xfd7zXZ\x00": "xz", b"BZh": "bzip2", b"\x28\xb5\x2f\xfd": "zstd", b"PK\x03\x04": "zip"}
 _CHUNK: Final = 1 << 20
 
 
@@ -105,7 +106,11 @@ def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePos
 def _opened(archive: Path, stack: ExitStack) -> IO[bytes]:
     """The archive's bytes, unpacked."""
     file = stack.enter_context(archive.open("rb"))
-    packed = file.read(len(_GZIP)) == _GZIP
+    head = file.read(max(map(len, _OTHERS)))
+    packed = head.startswith(_GZIP)
+    for magic, name in _OTHERS.items():
+        if head.startswith(magic):
+            raise ArtefactError(f"{archive}: expected a tar archive, plain or gzip, found {name}; unpack it first")
     file.seek(0)
     return cast("IO[bytes]", stack.enter_context(gzip.GzipFile(fileobj=file))) if packed else file
 

@@ -48,6 +48,8 @@ def runs_in(path: Path) -> tuple[list[Run], list[str]]:
     Raises:
         ArtefactError: There are none, or the archive cannot be read.
     """
+    if not path.exists():
+        raise ArtefactError(f"{path}: expected the study's archive or folder, found nothing there; check the path")
     runs, lost = (_in_folder(path), []) if path.is_dir() else _in_archive(path)
     usable = [run for run in runs if run.name.isprintable()]
     lost += [f"{run.place!r}: its name cannot be written; left out" for run in runs if run not in usable]

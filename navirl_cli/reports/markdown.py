@@ -45,7 +45,7 @@ def _block(block: Block, folder: Path) -> str:
         case Bullets(items):
             return "\n".join(f"- {_inline(item)}" for item in items)
         case Table():
-            return _table(block)
+            return table_text(block)
         case Picture():
             return _picture(block, folder)
 
@@ -86,7 +86,7 @@ def _escape(text: str, *, cell: bool) -> str:
     return escaped.replace("|", r"\|") if cell else escaped
 
 
-def _table(table: Table) -> str:
+def table_text(table: Table) -> str:
     """Header, rule and rows in columns of one width, below the caption."""
     grid = [[_inline(text, cell=True) for text in row] for row in (table.header, *table.rows)]
     widths = [max(3, *(len(row[i]) for row in grid)) for i in range(len(table.header))]

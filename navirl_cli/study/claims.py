@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric
 from navirl_cli.study.learning import Learnt
 from navirl_cli.study.measures import LEAVES_M, Measured, by_participant, mean_and_spread
 
@@ -36,7 +36,7 @@ class Difference:
     upper: float
     #: By participant.
     values: Mapping[str, float]
-    #: For closeness: standard deviation between the second cycle's paths, within which paths count as close.
+    #: For closeness: how far a participant's own second-cycle paths scatter, within which paths count as close.
     margin: float | None = None
 
     @property
@@ -82,7 +82,8 @@ def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]
         rows: Measured paths.
         learnt: Fits by participant; a pooled one is passed over.
     """
-    groups = {row.group for row in rows if np.isfinite(row.center_distance_m)}
+    rows = [row for row in rows if np.isfinite(row.center_distance_m)]  # as the tables have it: where there are people
+    groups = {row.group for row in rows}
     avoidance = next((group for group in AVOIDANCE if group in groups), None)
     claims = [
         _replays(rows),
@@ -121,19 +122,31 @@ def _kept(differences: Sequence[Difference | None]) -> tuple[Difference, ...]:
 
 def _metric(name: str, kind: str = "driven") -> Callable[[Measured], float]:
     """A metric of a measured path."""
-    return lambda row: float(getattr(getattr(row, kind), name))
+    return lambda row: float(getattr(row, kind)[name])
 
 
-def _close(rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]]) -> tuple[Difference, ...]:
-    """Each metric's values less the second cycle's, with the second cycle's own spread as the margin."""
+def _close(
+    rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
+) -> tuple[Difference, ...]:
+    """Each metric's values less the second cycle's, with the scatter within participants as the margin."""
     found = []
-    for metric in METRICS:
+    for metric in metrics:
         value = _metric(metric.name, kind)
         difference = paired(metric.label, metric.unit, one(metric.name), by_participant(rows, SECOND_CYCLE, value))
-        _, spread = mean_and_spread(value(row) for row in rows if row.group == SECOND_CYCLE)
         if difference is not None:
-            found.append(replace(difference, margin=spread))
+            found.append(replace(difference, margin=scatter_within(rows, value)))
     return tuple(found)
+
+
+def scatter_within(rows: Sequence[Measured], value: Callable[[Measured], float]) -> float:
+    """Pooled standard deviation of a participant's second-cycle paths about their own mean; NaN where all have one."""
+    own: dict[str, list[float]] = {}
+    for row in rows:
+        if row.group == SECOND_CYCLE:
+            own.setdefault(row.participant, []).append(value(row))
+    squares = sum(float(np.var(values)) * len(values) for values in own.values())
+    freedom = sum(len(values) - 1 for values in own.values())
+    return float(np.sqrt(squares / freedom)) if freedom else float("nan")
 
 
 def _replays(rows: Sequence[Measured]) -> Claim:
@@ -142,7 +155,7 @@ def _replays(rows: Sequence[Measured]) -> Claim:
         "replays",
         "The learnt policy's paths are close to those of the second force cycle (replays that the robot drove).",
         f"Replay of the learnt policy less {SECOND_CYCLE}, driven paths",
-        _close(rows, "driven", lambda name: by_participant(rows, REPLAY, _metric(name))),
+        _close(rows, "driven", lambda name: by_participant(rows, REPLAY, _metric(name)), PAPER_METRICS),
     )
 
 
@@ -153,12 +166,13 @@ def _expected(rows: Sequence[Measured], learnt: Sequence[Learnt], *, own: bool) 
         of_cycle = one.second if own else one.first
         if one.participant is not None and of_cycle is not None and of_cycle.near is not None:
             near[one.participant] = of_cycle.near
-    differences = _close(
-        rows, "on_grid", lambda name: {who: float(getattr(one.expected, name)) for who, one in near.items()}
-    )
+    # Length is a feature of the reward: a policy expects the mean length of whatever it was learnt from.
+    metrics = [metric for metric in PAPER_METRICS if not own or metric.name != "length_m"]
+    expected = {m.name: {who: float(one.expected[m.name]) for who, one in near.items()} for m in metrics}
+    differences = _close(rows, "on_grid", lambda name: expected[name], metrics)
     if own:
-        title = "learnt policies"
-        text = "The learnt policy's paths are close to those of the second force cycle (expected under the policy)."
+        title = "goodness of fit"
+        text = "The learnt policy's paths are close to those of the second force cycle, from which it was learnt."
     else:
         title = "foretold from cycle 1"
         text = "What was learnt from the first cycle foretells the second cycle's paths."
@@ -176,12 +190,17 @@ def _joystick(rows: Sequence[Measured]) -> Claim:
     )
 
 
+def _who(avoidance: str) -> str:
+    """How a group of a robot without a person's say is called."""
+    return "Obstacle avoidance" if avoidance == AVOIDANCE[0] else "The robot by itself (autonomous)"
+
+
 def _latest(rows: Sequence[Measured], avoidance: str) -> Claim:
     """Where paths leave the nominal one."""
     onset = [by_participant(rows, group, lambda row: row.onset_m) for group in (SECOND_CYCLE, avoidance)]
     return Claim(
         "late avoidance",
-        "Obstacle avoidance begins to give way later than people wish.",
+        f"{_who(avoidance)} begins to give way later than people wish.",
         f"Way left to the person when the path is {LEAVES_M:g} m off the nominal one: {SECOND_CYCLE} less {avoidance}",
         _kept([paired("way left to the person", "m", *onset)]),
     )
@@ -193,7 +212,7 @@ def _smallest(rows: Sequence[Measured], avoidance: str, others: Sequence[str]) -
     least = by_participant(rows, avoidance, area)
     return Claim(
         "smallest area",
-        "Paths of obstacle avoidance have the smallest area under the path.",
+        f"{_who(avoidance)} takes the paths with the smallest area under them.",
         f"Each other group less {avoidance}, driven paths",
         _kept([paired(f"area, {group}", "m²", by_participant(rows, group, area), least) for group in others]),
     )

@@ -1,22 +1,18 @@
 """Fits of one participant or of all together, and how near the learnt policy's paths come to the demonstrated ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import NavirlError
-from navirl_cli.evaluation.compare import ON_GRID, GroupMetrics, summary_of
-from navirl_cli.evaluation.metrics import PathMetrics, path_metrics
+from navirl_cli.evaluation.compare import LEARNT, ON_GRID, compare
+from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.metrics import Values
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Fit, fit
-from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.paths import length_moments, sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import scenes_of
-from navirl_cli.study.measures import nominal_of
 
 FIRST, SECOND = 1, 2
 
@@ -26,13 +22,13 @@ class Closeness:
     """Properties of a learnt policy's paths beside those of the demonstrations in the same scenes."""
 
     #: Of the demonstrated paths through the centres of their cells, as the policy's paths go.
-    demonstrated: PathMetrics
-    demonstrated_spread: PathMetrics
+    demonstrated: Values
+    demonstrated_spread: Values
     #: Under the policy: expected value and standard deviation of one path.
-    expected: PathMetrics
-    spread: PathMetrics
+    expected: Values
+    spread: Values
     #: Monte Carlo standard error of the expected value; 0 of the length, which is exact.
-    error: PathMetrics
+    error: Values
     demonstrations: int
 
 
@@ -79,10 +75,17 @@ def is_of_cycle(demonstration: Demonstration, cycle: int) -> bool:
     return demonstration.condition is Condition.FORCE and demonstration.cycle == cycle and demonstration.set is None
 
 
+def people_of(demonstrations: Sequence[Demonstration]) -> list[str]:
+    """Participants from whom there is something to learn, in order."""
+    return list(
+        dict.fromkeys(one.participant for one in demonstrations if is_of_cycle(one, FIRST) or is_of_cycle(one, SECOND))
+    )
+
+
 def jobs_of(demonstrations: Sequence[Demonstration], samples: int, seed: int) -> list[Job]:
     """One job a participant, and last one for the second cycles of all."""
     taught = [one for one in demonstrations if is_of_cycle(one, FIRST) or is_of_cycle(one, SECOND)]
-    people = list(dict.fromkeys(one.participant for one in taught))
+    people = people_of(taught)
     own = [
         Job(name, tuple(one for one in taught if one.participant == name), samples, (seed, number))
         for number, name in enumerate(people)
@@ -102,9 +105,11 @@ def learn(job: Job) -> Learnt:
         shown = job.of_cycle(cycle)
         try:
             if shown:
-                fitted = fit(evidence_of(shown), reward)
-                reward = fitted.reward
-                found[cycle] = CycleFit(fitted, closeness(reward, seconds, job.samples, rng) if seconds else None)
+                found[cycle] = CycleFit(fit(evidence_of(shown), reward), None)
+                reward = found[cycle].fit.reward
+            if shown and seconds:
+                near = closeness(reward, seconds, job.samples, rng)
+                found[cycle] = replace(found[cycle], near=near)
         except NavirlError as error:
             trouble.append(f"{job.participant or 'all'}, cycle {cycle}: {error}")
     return Learnt(job.participant, found.get(FIRST), found.get(SECOND), tuple(trouble))
@@ -115,58 +120,25 @@ def closeness(
 ) -> Closeness:
     """Expected properties of a policy's paths in the scenes of demonstrations.
 
-    The expected length and its spread are exact; distance and area are means over sampled paths. Scenes count by their
-    number of demonstrations, and the spread holds the differences between scenes.
+    The expected length is exact; what else there is are means over sampled paths. Scenes count by their number of
+    demonstrations, and the spread holds the differences between scenes.
 
     Args:
         reward: What was learnt.
-        demonstrations: What was demonstrated.
+        demonstrations: What was demonstrated, of one group.
         samples: Paths to sample in each scene.
         rng: Source of randomness.
 
     Raises:
         RewardError: The reward has no policy in a scene.
     """
-    scenes = scenes_of(demonstrations)
-    shown, drawn, weights = [], [], []
-    for scene in {id(scene): scene for scene in scenes}.values():
-        members = [one for one, its in zip(demonstrations, scenes, strict=True) if its is scene]
-        nominal = nominal_of(members[0], scene)
-        shown += [_on_grid(one.grid.centres_of(one.cells), one, nominal) for one in members]
-        policy = policy_of(reward, scene)
-        lines = sampled_lines_m(policy, sample_paths(policy, scene.start, samples, rng))
-        sampled = summary_of("", ON_GRID, [_on_grid(line, members[0], nominal) for line in lines])
-        drawn.append(_expected(sampled, length_moments(policy, scene.start)))
-        weights.append(len(members) / len(demonstrations))
-    demonstrated = summary_of("", ON_GRID, shown)
-    means, variances, errors = np.moveaxis(np.array(drawn), 1, 0)
-    share = np.array(weights)
-    expected = share @ means
+    found = compare(demonstrations, {LEARNT: reward}, Precision(samples), rng).groups
+    shown, learnt = (next(row for row in found if row.kind == kind) for kind in (ON_GRID, LEARNT))
     return Closeness(
-        demonstrated=demonstrated.mean,
-        demonstrated_spread=demonstrated.std,
-        expected=PathMetrics(*expected.tolist()),
-        # the law of total variance
-        spread=PathMetrics(*np.sqrt(share @ (variances + (means - expected) ** 2)).tolist()),
-        error=PathMetrics(*np.sqrt(share**2 @ errors**2).tolist()),
+        demonstrated=shown.mean,
+        demonstrated_spread=shown.std,
+        expected={**learnt.mean, **learnt.exact},
+        spread=learnt.std,
+        error={**learnt.error, **dict.fromkeys(learnt.exact, 0.0)},
         demonstrations=len(demonstrations),
-    )
-
-
-def _on_grid(line_m: FloatArray, one: Demonstration, nominal_m: FloatArray) -> PathMetrics:
-    """Properties of a line in the scene of a demonstration."""
-    return path_metrics(line_m, nominal_m, one.people_m, one.robot_radius_m)
-
-
-def _expected(sampled: GroupMetrics, length: tuple[float, float]) -> FloatArray:
-    """(3, 3): mean, variance and Monte Carlo error of length (known exactly), distance and area in one scene."""
-    mean, std = sampled.mean, sampled.std
-    exact_mean, exact_variance = length
-    error = np.array([0.0, std.min_distance_m, std.area_m2]) / np.sqrt(sampled.count)
-    return np.array(
-        [
-            [exact_mean, mean.min_distance_m, mean.area_m2],
-            [exact_variance, std.min_distance_m**2, std.area_m2**2],
-            error,
-        ]
     )

@@ -8,7 +8,7 @@ import numpy as np
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, summary_of
-from navirl_cli.evaluation.metrics import PathMetrics, path_metrics
+from navirl_cli.evaluation.metrics import Values, paper_values
 from navirl_cli.irl.scene import Scene, scenes_of
 
 #: A path has left the nominal one where it is farther from it than this, m: a cell and a half.
@@ -22,9 +22,9 @@ class Measured:
     id: str
     participant: str
     group: str
-    driven: PathMetrics
+    driven: Values
     #: Through the centres of its cells, comparable with learnt paths.
-    on_grid: PathMetrics
+    on_grid: Values
     #: Least distance between the robot's centre and a person's, m; NaN where there is nobody.
     center_distance_m: float
     #: How far before the first person, along the nominal path, the robot left it, m; NaN where it never did, or did not
@@ -49,7 +49,7 @@ def nominal_of(demonstration: Demonstration, scene: Scene) -> FloatArray:
 def _measured(one: Demonstration, scene: Scene) -> Measured:
     nominal = nominal_of(one, scene)
     driven, on_grid = (
-        path_metrics(line, nominal, one.people_m, one.robot_radius_m)
+        paper_values(line, nominal, one.people_m, one.robot_radius_m)
         for line in (one.xy_m, one.grid.centres_of(one.cells))
     )
     return Measured(
@@ -58,7 +58,7 @@ def _measured(one: Demonstration, scene: Scene) -> Measured:
         group=group_of(one),
         driven=driven,
         on_grid=on_grid,
-        center_distance_m=driven.min_distance_m + one.robot_radius_m,
+        center_distance_m=driven["min_distance_m"] + one.robot_radius_m,
         onset_m=onset_m(one.xy_m, nominal, one.people_m),
     )
 
@@ -98,6 +98,8 @@ class GroupProperties:
     #: Distance between centres and onset, m: mean and sample standard deviation.
     center_distance_m: tuple[float, float]
     onset_m: tuple[float, float]
+    #: Number of paths that have an onset.
+    onsets: int
     participants: int
 
 
@@ -122,6 +124,7 @@ def _properties(group: str, rows: Sequence[Measured]) -> GroupProperties:
         summary_of(group, ON_GRID, [row.on_grid for row in rows]),
         mean_and_spread([row.center_distance_m for row in rows]),
         mean_and_spread([row.onset_m for row in rows]),
+        int(np.isfinite([row.onset_m for row in rows]).sum()),
         len({row.participant for row in rows}),
     )
 

@@ -1,10 +1,10 @@
 """The paper's evaluation from demonstrations to numbers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import log_likelihood
@@ -53,7 +53,7 @@ def study_of(
     samples: int,
     seed: int,
     *,
-    published: bool = False,
+    published: Collection[str] = (),
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
 ) -> Study:
@@ -64,7 +64,7 @@ def study_of(
         completion_s: Times in which the obstacle course was completed, s, by modality and participant.
         samples: Paths to sample from every learnt policy in every scene.
         seed: Of the sampling; the same seed gives the same numbers, whatever the number of processes.
-        published: Whether these are the published study's paths, so that its parameters can be compared.
+        published: Participants of the published study, with whom its parameters can be compared.
         progress: Called with the number of fits done and whose was the last.
         executor: Where to run; by default local processes.
 
@@ -73,12 +73,7 @@ def study_of(
         SceneError: A demonstration's scene has no way from start to goal.
     """
     if not any(is_of_cycle(one, SECOND) for one in demonstrations):
-        cycles = sorted({one.cycle for one in demonstrations if one.cycle is not None})
-        raise DemonstrationError(
-            f"a study needs trials of the condition force in cycle {SECOND}, found "
-            f"{f'cycles {cycles} only' if cycles else 'no cycles'}; say which trial is what in the logs' metadata "
-            "record navirl.session, as the README has it"
-        )
+        raise _refusal(demonstrations)
     learnt: list[Learnt] = []
     for one in map_in_order(learn, jobs_of(demonstrations, samples, seed), executor):
         learnt.append(one)
@@ -92,13 +87,28 @@ def study_of(
         groups=tuple(groups_of(demonstrations, rows)),
         participants=participants,
         pooled=pooled,
-        published_log_likelihood=_published_log_likelihood(demonstrations) if published else None,
+        published_log_likelihood=_published_log_likelihood(demonstrations, published),
         claims=tuple(claims_of(rows, participants)),
         completion_s=completion_s,
     )
 
 
-def _published_log_likelihood(demonstrations: Sequence[Demonstration]) -> float:
-    """Of the second cycles of all, under the published parameters, nats."""
+def _published_log_likelihood(demonstrations: Sequence[Demonstration], published: Collection[str]) -> float | None:
+    """Of the second cycles of all under the published parameters, nats; None unless all are of the published study."""
     seconds = [one for one in demonstrations if is_of_cycle(one, SECOND)]
+    if not all(one.participant in published for one in seconds):
+        return None
     return log_likelihood(evidence_of(seconds), Reward.named(PUBLISHED_THETA))
+
+
+def _refusal(demonstrations: Sequence[Demonstration]) -> DemonstrationError:
+    """What is missing for a study, and what is there."""
+    pushed = [one for one in demonstrations if one.condition is Condition.FORCE]
+    kinds = sorted(
+        {f"{'no cycle' if one.cycle is None else f'cycle {one.cycle}'}, {one.set or 'no set'}" for one in pushed}
+    )
+    there = f"{len(pushed)} trials of it ({'; '.join(kinds)})" if pushed else "none of that condition"
+    return DemonstrationError(
+        f"a study needs trials of the condition force in cycle {SECOND} and without a set, found {there}; say which "
+        "trial is what in the logs' metadata record navirl.session, as the README has it"
+    )

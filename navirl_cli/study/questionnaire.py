@@ -121,7 +121,7 @@ def _text(path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise ArtefactError(f"{path}: expected a CSV file, cannot be read: {error.strerror}") from error
+        raise ArtefactError(f"{path}: expected a CSV file, cannot be read: {error.strerror}; check the path") from error
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -147,11 +147,11 @@ def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
 def _check_header(where: str, header: list[str]) -> None:
     """Refuse columns that are missing, unknown or there twice."""
     if not header:
-        raise ArtefactError(f"{where}: expected {_HEADER}, found nothing")
+        raise ArtefactError(f"{where}: expected {_HEADER}, found nothing; give the file with the answers")
     for name in COLUMNS:
         if name not in header and name != OPTIONAL:
             raise ArtefactError(
-                f"{where}: expected {_HEADER}, found no column {name} but {brief(','.join(header))}; name the columns"
+                f"{where}: expected {_HEADER}, found no column {name} but {brief(','.join(header))}; name them so"
             )
     for name in header:
         if name not in COLUMNS or header.count(name) > 1:

@@ -1,25 +1,26 @@
 """Every number of a study's report as JSON."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from navirl_cli.artefacts.store import number
 from navirl_cli.evaluation.compare import GroupMetrics
-from navirl_cli.evaluation.metrics import PathMetrics
+from navirl_cli.evaluation.metrics import PAPER_METRICS, Values
 from navirl_cli.irl.fit import Fit
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt
 from navirl_cli.study.measures import GroupProperties
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
+from navirl_cli.study.questionnaire import Shares
 
 
-def study_document(study: Study, cells: Mapping[str, bool]) -> dict[str, Any]:
+def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Sequence[Shares]) -> dict[str, Any]:
     """The content of a study's summary.
 
     Args:
         study: The study.
-        cells: By published path, whether our cells are the published ones; empty where none were published.
+        cells: Published paths, and whether our cells are the same; empty where none were published.
+        answers: To the questionnaire; none where there is none.
     """
     return {
         "participants": {one.participant: _learnt(one) for one in study.participants},
@@ -31,6 +32,16 @@ def study_document(study: Study, cells: Mapping[str, bool]) -> dict[str, Any]:
             for modality, known in study.completion_s.items()
         },
         "published": _published(study, cells) if cells else None,
+        "answers": [
+            {
+                "question": one.question,
+                "modality": one.modality,
+                "n": one.count,
+                "median": number(one.median),
+                "counts": one.counts.tolist(),
+            }
+            for one in answers
+        ],
         "demonstrations": [
             {
                 "id": row.id,
@@ -44,8 +55,9 @@ def study_document(study: Study, cells: Mapping[str, bool]) -> dict[str, Any]:
     }
 
 
-def _metrics(metrics: PathMetrics) -> dict[str, float | None]:
-    return {name: number(value) for name, value in asdict(metrics).items()}
+def _metrics(values: Values) -> dict[str, float | None]:
+    """The paper's three."""
+    return {metric.name: number(values[metric.name]) for metric in PAPER_METRICS}
 
 
 def _learnt(learnt: Learnt) -> dict[str, Any]:
@@ -57,7 +69,16 @@ def _cycle(found: CycleFit | None) -> dict[str, Any]:
     """One cycle's fit and how near its paths come to the second cycle's; nulls where there is none."""
     if found is None:
         return dict.fromkeys(
-            ("theta", "standard_errors", "status", "log_likelihood", "steps", "demonstrations", "paths")
+            (
+                "theta",
+                "standard_errors",
+                "standard_errors_clustered",
+                "status",
+                "log_likelihood",
+                "steps",
+                "demonstrations",
+                "paths",
+            )
         )
     return {**_fit(found.fit), "paths": None if found.near is None else _closeness(found.near)}
 
@@ -67,6 +88,9 @@ def _fit(fit: Fit) -> dict[str, Any]:
     return {
         "theta": dict(zip(names, fit.reward.theta, strict=True)),
         "standard_errors": _by_name(names, fit.standard_errors.tolist()),
+        "standard_errors_clustered": None
+        if fit.clustered_errors is None
+        else _by_name(names, fit.clustered_errors.tolist()),
         "status": fit.status.value,
         "log_likelihood": fit.log_likelihood,
         "steps": fit.steps,
@@ -132,12 +156,12 @@ def _claim(claim: Claim) -> dict[str, Any]:
     }
 
 
-def _published(study: Study, cells: Mapping[str, bool]) -> dict[str, Any]:
+def _published(study: Study, cells: Sequence[tuple[str, bool]]) -> dict[str, Any]:
     """How the results compare with what was published."""
     return {
         "paths": len(cells),
-        "cells_equal": sum(cells.values()),
-        "cells_other": sorted(name for name, same in cells.items() if not same),
+        "cells_equal": sum(same for _, same in cells),
+        "cells_other": sorted(name for name, same in cells if not same),
         "theta": PUBLISHED_THETA,
         "theta_participants": PUBLISHED_PARTICIPANTS,
         "log_likelihood_at_theta": study.published_log_likelihood,

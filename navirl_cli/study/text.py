@@ -4,16 +4,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from navirl_cli import __version__
-from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
 from navirl_cli.reports.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.study.claims import Claim
+from navirl_cli.study.learning import CycleFit
 from navirl_cli.study.measures import LEAVES_M
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, Study
+from navirl_cli.study.questionnaire import Shares
 from navirl_cli.study.tables import (
+    answers_table,
     claims_table,
     closeness_table,
     completion_table,
@@ -41,15 +46,17 @@ _INTRODUCTION = (
 )
 _VERDICTS = (
     "Differences are paired by participant, each participant counting with the mean over the trials; intervals are "
-    "Student's. Paths count as close where the whole interval lies within one standard deviation between the paths of "
-    "the second force cycle, and not close where it lies beyond. What the interval does not decide is not settled by "
+    "Student's. Paths count as close where the whole interval lies within the scatter (standard deviation) of a "
+    "participant's own second-cycle paths, and not close where it lies beyond: as near as the participant's paths are "
+    "to each other. Goodness of fit is no foresight: the policy was learnt from these very paths, so that only what "
+    "was not a feature of the reward is asked. What the interval does not decide is not settled by "
     "so many participants, which is no evidence against it. Participants whose own difference speaks against a claim "
     "stand under not so for."
 )
 _UNIDENTIFIED = (
     "Two demonstrations do not always tell four parameters. A parameter that is not identified, or on its bound, has "
-    "no standard error; one whose standard error is as large as its value rests on little. There the small regulariser "
-    "keeps the value from growing without end."
+    "no standard error; one whose standard error exceeds half of its value rests on little. There the small "
+    "regulariser keeps the value from growing without end."
 )
 _ON_GRID = (
     "A path through cells is up to 8 % longer than the line that was driven, so that these lengths do not compare with "
@@ -67,10 +74,12 @@ class Told:
     logs: Sequence[str]
     #: What was odd, skipped or lost, in words.
     notes: Sequence[str]
-    #: Cells by published path, and whether ours are the same.
-    cells: Mapping[str, bool]
+    #: Published paths, and whether our cells are the same.
+    cells: Sequence[tuple[str, bool]]
     #: Figures drawn, by name.
     figures: Mapping[str, Path]
+    #: Answers to the questionnaire.
+    answers: Sequence[Shares]
     samples: int
     seed: int
 
@@ -82,8 +91,10 @@ def report_of(study: Study, told: Told) -> Report:
         study: The numbers.
         told: What else it tells.
     """
-    people, seconds = len(study.participants), len(study.seconds)
-    what = f"{people} participants, {len(study.demonstrations)} trials, {seconds} of them in the second force cycle."
+    everyone = len({one.participant for one in study.demonstrations})
+    people = f"{everyone} participant{'s' if everyone > 1 else ''}"
+    seconds = len(study.seconds)
+    what = f"{people}, {len(study.demonstrations)} trials, {seconds} of them in the second force cycle."
     blocks: list[Block] = [
         Paragraph(f"{what} {_INTRODUCTION}"),
         Heading("The paper's claims, asked of these participants"),
@@ -108,7 +119,7 @@ def report_of(study: Study, told: Told) -> Report:
         Heading("How it was computed"),
         _method(told),
     ]
-    return Report(f"User study with {people} participants", tuple(blocks), f"navirl {__version__}")
+    return Report(f"User study with {people}", tuple(blocks), f"navirl {__version__}")
 
 
 def claims_lines(claims: Sequence[Claim], mark: str = "") -> list[str]:
@@ -136,13 +147,14 @@ def _tasks(study: Study, told: Told) -> list[Block]:
         blocks += [Heading("Obstacle course"), completion_table(study.completion_s)]
         blocks += _pictures(told, "fig2_completion_times")
     if "fig4_answers" in told.figures:
-        blocks += [Heading("Questionnaire"), *_pictures(told, "fig4_answers")]
+        blocks += [Heading("Questionnaire"), answers_table(told.answers), *_pictures(told, "fig4_answers")]
     return blocks
 
 
 def _definitions() -> Bullets:
-    own = [f"{metric.label}: {metric.definition}" for metric in METRICS]
+    own = [f"{metric.label}: {metric.definition}" for metric in PAPER_METRICS]
     leaves = f"leaves before person: way left to the first person, along the nominal path, when {LEAVES_M:g} m off it"
+    leaves += "; of the paths, counted in brackets, that start on it and leave it by as much"
     return Bullets((*own, "distance of centres: the least distance of the robot's centre from a person's", leaves))
 
 
@@ -151,27 +163,32 @@ def _rewards(study: Study) -> list[Block]:
     blocks: list[Block] = [rewards_table(study)]
     pooled = study.pooled.second
     if pooled is not None and study.published_log_likelihood is not None:
-        people, published = len(study.participants), study.published_log_likelihood
-        which = "these participants" if people == PUBLISHED_PARTICIPANTS else f"{PUBLISHED_PARTICIPANTS} participants"
+        published, here = study.published_log_likelihood, len({one.participant for one in study.seconds})
         gain = pooled.fit.log_likelihood - published
         blocks.append(
             Paragraph(
-                f"The published parameters were learnt from the second cycles of {which}. Under them the second cycles "
-                f"of the {people} here have a log-likelihood of {published:.4f}, under the pooled fit "
-                f"{pooled.fit.log_likelihood:.4f}: a difference of {signed(gain)} nats."
+                f"The published parameters were learnt from the second cycles of {PUBLISHED_PARTICIPANTS} people. "
+                f"Under them the second cycles of the {here} here have a log-likelihood of {published:.4f}, under the "
+                f"pooled fit {pooled.fit.log_likelihood:.4f}: a difference of {signed(gain)} nats."
             )
         )
     cycles = [cycle for one in study.participants for cycle in (one.first, one.second) if cycle is not None]
-    if any(cycle.fit.status is not Status.CONVERGED for cycle in cycles):
+    if any(_is_weak(cycle) for cycle in cycles):
         blocks.append(Paragraph(_UNIDENTIFIED))
     return blocks
+
+
+def _is_weak(cycle: CycleFit) -> bool:
+    """Whether a fit is unsure of a parameter: it did not converge, or a standard error exceeds half of its value."""
+    values, errors = np.abs(cycle.fit.reward.theta), cycle.fit.standard_errors
+    return cycle.fit.status is not Status.CONVERGED or bool((errors > values / 2).any())
 
 
 def _read(told: Told) -> list[Block]:
     """Logs, cells beside published ones, and notes."""
     blocks: list[Block] = [Paragraph(f"{len(told.logs)} logs: {', '.join(f'`{log}`' for log in told.logs)}.")]
     if told.cells:
-        other = sorted(name for name, same in told.cells.items() if not same)
+        other = sorted(name for name, same in told.cells if not same)
         extra = f"; others: {', '.join(other)}" if other else ""
         same = len(told.cells) - len(other)
         blocks.append(Paragraph(f"Cells equal to those published: **{same} of {len(told.cells)} paths**{extra}."))
