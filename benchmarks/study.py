@@ -1,4 +1,4 @@
-"""Time the published study as a user waits for it: one path onto the grid, the import, the whole evaluation.
+"""Time the published study as a user waits for it: a path onto the grid, drawn paths, import, the whole evaluation.
 
 python benchmarks/study.py [--quick] [--json]. Needs the published data (environment variable NAVIRL_STUDY_DIR: the
 unpacked runs, or the archive). Each row ends with its bar; exit 0 only where every bar holds. The bars are for four
@@ -13,11 +13,18 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 from rows import Row, median_seconds, report
 
 from navirl_cli.demos.rasterize import rasterize
+from navirl_cli.evaluation.policy_paths import Steps
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.paths import SampledPaths, sample_paths
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene
 from navirl_cli.published.participant import participant_of
 from navirl_cli.published.runs import runs_in
+from navirl_cli.study.pipeline import PUBLISHED_THETA
 
 BIN = Path(sys.executable).parent
 FOUR = 4
@@ -34,7 +41,7 @@ def main() -> int:
         print(f"the published study's data are not at hand in {where}; set NAVIRL_STUDY_DIR", file=sys.stderr)
         return 2
     runs = 1 if options.quick else 5
-    return report([*paths(where, runs), *commands(where, runs)], as_json=options.json)
+    return report([*paths(where, runs), *drawn(where, runs), *commands(where, runs)], as_json=options.json)
 
 
 def paths(where: Path, runs: int) -> list[Row]:
@@ -47,6 +54,24 @@ def paths(where: Path, runs: int) -> list[Row]:
         Row.at_least(f"cells as published, of {len(every)} paths", same, "", len(every)),
         Row.at_most("discretising a path, median", 1e3 * sorted(times)[len(times) // 2], "ms", 10.0),
         Row.at_most("discretising a path, slowest", 1e3 * max(times), "ms", 10.0),
+    ]
+
+
+def drawn(where: Path, runs: int) -> list[Row]:
+    """Ten thousand paths of the published policy on the study's map."""
+    one = participant_of(runs_in(where)[0][0])
+    passed = next(path for path in one.paths if path.part.cycle == 2)
+    scene = Scene.on(one.grid, passed.cells[0], passed.cells[-1], one.grid.centres_of(passed.people))
+    policy = policy_of(Reward.named(PUBLISHED_THETA), scene)
+    steps, nominal = Steps.of(scene.lattice, scene.people_m, 0.4), scene.nominal_line_m()
+
+    def draw() -> SampledPaths:
+        return sample_paths(policy, scene.start, 10_000, np.random.default_rng(0))
+
+    paths = draw()
+    return [
+        Row.at_most("drawing 10,000 paths", median_seconds(draw, runs), "s", 3.0),
+        Row.at_most("measuring them", median_seconds(lambda: steps.measured(paths, nominal), runs), "s", 10.0),
     ]
 
 

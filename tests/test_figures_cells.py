@@ -152,7 +152,7 @@ def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(valu
     assert not any(patch.get_fill() for patch in drawn.axes.patches)
     assert to_rgba(person.get_edgecolor()) == to_rgba("black")
     (halo,) = person.get_path_effects()
-    assert halo._gc["foreground"] == "white"
+    assert to_rgba(halo._gc["foreground"]) == to_rgba("white")
     assert halo._gc["linewidth"] > person.get_linewidth()
     (robot,) = [patch for patch in drawn.axes.patches if patch is not person]
     assert person.get_linewidth() >= 2 * robot.get_linewidth()  # so that the two are not taken for each other

@@ -1,6 +1,6 @@
 """Learnt rewards as files."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,16 @@ from navirl_cli.irl.validation import Validation
 
 
 @dataclass(frozen=True)
+class Search:
+    """The way of the search that found a maximum, from its start; a corrected bias is not in it."""
+
+    #: (m,) nats.
+    log_likelihood: FloatArray
+    #: (m, k) in the parameters' units.
+    theta: FloatArray
+
+
+@dataclass(frozen=True)
 class LearntReward:
     """A reward as read back from its file."""
 
@@ -35,6 +45,8 @@ class LearntReward:
     status: Status
     #: Profile likelihoods that were followed.
     profiles: tuple[Profile, ...] = ()
+    #: None of files from before it was kept.
+    search: Search | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +97,7 @@ def reward_document(
         "steps": fit.steps,
         "iterations": fit.iterations,
         "evaluations": fit.evaluations,
+        "search": {"log_likelihood": fit.path_log_likelihood.tolist(), "theta": fit.path_theta.tolist()},
         "bootstrap": None if analyses.bootstrap is None else bootstrap_document(analyses.bootstrap),
         "profiles": [profile_document(one) for one in analyses.profiles],
         "cross_validation": None if analyses.validation is None else validation_document(analyses.validation),
@@ -147,7 +160,24 @@ def read_reward(path: Path) -> LearntReward:
         demonstrations=tuple(document["demonstrations"]),
         status=Status(document["status"]),
         profiles=profiles,
+        search=_search(document.get("search"), len(names), path),
     )
+
+
+def _search(content: Mapping[str, Any] | None, count: int, path: Path) -> Search | None:
+    """The way of the search in a file.
+
+    Raises:
+        ArtefactError: There are not as many values of each parameter as of the likelihood.
+    """
+    if content is None:
+        return None
+    nats, theta = content["log_likelihood"], content["theta"]
+    if len(theta) != len(nats) or any(len(one) != count for one in theta):
+        raise ArtefactError(
+            f"{path}: search/theta: expected {len(nats)} rows of {count} numbers, as search/log_likelihood"
+        )
+    return Search(np.array(nats, dtype=float), np.array(theta, dtype=float))
 
 
 def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> LearntReward:

@@ -11,6 +11,7 @@ from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.reports.document import Table
 
 #: Two groups and their comparison by metric.
 Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
@@ -41,7 +42,7 @@ def tables(result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Seq
     for one, other, found in pairs:
         parts += [f"{one} less {other}, driven paths, paired by participant", formatted(*_paired(found, metrics), how)]
     if ranks:
-        parts += [_uniform(ranks), formatted(*_ranks(ranks), how)]
+        parts += [uniform_line(ranks), formatted(*_ranks(ranks), how)]
     if how is Format.TEXT:
         parts.append("\n".join(_legend(result, metrics)))
     return "\n\n".join(parts)
@@ -55,6 +56,12 @@ def _groups(result: Comparison, metrics: Sequence[Metric]) -> tuple[list[str], l
         for row in result.groups
     ]
     return header, rows
+
+
+def group_table(result: Comparison, metrics: Sequence[Metric]) -> Table:
+    """Mean and spread by group and kind of path, for a report."""
+    header, rows = _groups(result, metrics)
+    return Table(tuple(header), tuple(map(tuple, rows)), "Mean ± standard deviation.")
 
 
 def _by_metric(result: Comparison, metrics: Sequence[Metric], how: Format) -> list[str]:
@@ -104,7 +111,8 @@ def _paired(found: Mapping[str, Paired], metrics: Sequence[Metric]) -> tuple[lis
     return header, rows
 
 
-def _uniform(ranks: Sequence[Rank]) -> str:
+def uniform_line(ranks: Sequence[Rank]) -> str:
+    """What ranks say of a model, in a line."""
     statistic, p_value = uniformity(ranks)
     return (
         f"ranks of {len(ranks)} demonstrations among the policy's paths; a calibrated model gives uniform ranks: "

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import by_group
-from navirl_cli.figures.ground import Window, ground_handles, window_around
-from navirl_cli.figures.paths import DrawnPaths, draw_paths
+from navirl_cli.figures.ground import Window
+from navirl_cli.figures.marks import merged_handles
+from navirl_cli.figures.paths import DrawnPaths, contact_handle, draw_paths, group_handles, window_of
 from navirl_cli.figures.sheet import common_legend, outer_labels
-from navirl_cli.figures.style import colour_of, house_style, panel_width_in
+from navirl_cli.figures.style import house_style, panel_width_in
 
 #: Mean width of a letter of a title, with what of the panel stands beside its map, inches.
 _LETTER_IN = 0.08
@@ -35,7 +34,9 @@ class DrawnPanels:
 
 
 @house_style()
-def draw_path_panels(axes: Sequence[Axes], panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> DrawnPanels:
+def draw_path_panels(
+    axes: Sequence[Axes], panels: Sequence[tuple[str, Sequence[Demonstration]]], *, crop: bool = False
+) -> DrawnPanels:
     """Draw the driven paths of several conditions, a panel each, all over the same part of the map.
 
     Only the outermost panels have labels on their axes; one legend stands below all.
@@ -43,6 +44,7 @@ def draw_path_panels(axes: Sequence[Axes], panels: Sequence[tuple[str, Sequence[
     Args:
         axes: One for each panel, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
         panels: Titles, to which the number of paths is added, and demonstrations, all in the same map frame.
+        crop: Show no more of the map than what surrounds the paths.
 
     Returns:
         The artists.
@@ -56,14 +58,13 @@ def draw_path_panels(axes: Sequence[Axes], panels: Sequence[tuple[str, Sequence[
         if not members:
             raise DemonstrationError(f"no demonstration to draw for the panel {title!r}")
     everyone = [one for _, members in panels for one in members]
-    seen = np.concatenate([*(one.xy_m for one in everyone), np.array([one.goal_m for one in everyone])])
-    window = window_around([one.grid for one in everyone], seen)
+    shared: dict[str, Any] = {"window_m": window_of(everyone, crop=crop), "among": everyone, "legend": False}
     drawn = [
-        draw_paths(panel, members, window_m=window, title=_title(panel, title, len(members)), legend=False)
+        draw_paths(panel, members, title=_title(panel, title, len(members)), **shared)
         for panel, (title, members) in zip(axes, panels, strict=True)
     ]
     outer_labels(axes)
-    return DrawnPanels(drawn, window, common_legend(axes, _handles(drawn, panels)))
+    return DrawnPanels(drawn, shared["window_m"], common_legend(axes, _handles(drawn, panels)))
 
 
 def _title(axes: Axes, title: str, count: int) -> str:
@@ -75,10 +76,5 @@ def _title(axes: Axes, title: str, count: int) -> str:
 def _handles(drawn: Sequence[DrawnPaths], panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> list[Artist]:
     """Legend entries of groups, of contact where there was any, and of what is on the maps."""
     groups = dict.fromkeys(group for _, members in panels for group in by_group(members))
-    handles: list[Artist] = [Line2D([], [], color=colour_of(group), linewidth=1.0, label=group) for group in groups]
-    contacts = [line for one in drawn for line in one.contacts]
-    if contacts:
-        grey: dict[str, Any] = {"color": "0.3", "linewidth": contacts[0].get_linewidth()}
-        handles.append(Line2D([], [], label="in contact", **grey))
-    most = max(drawn, key=lambda one: len(one.people))
-    return [*handles, *ground_handles(most.people, most.robots, nominal=False, filled=True)]
+    contact = [contact_handle()] if any(one.contacts for one in drawn) else []
+    return [*group_handles(groups), *contact, *merged_handles([one.marks for one in drawn])]

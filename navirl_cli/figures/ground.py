@@ -1,8 +1,7 @@
-"""What figures of a map share: obstacles, people, start and goal to scale, axes in metres, legend below."""
+"""What figures of a map share: the part of it that is shown, obstacles, axes in metres, legend below."""
 
 from collections.abc import Sequence
 from math import ceil
-from typing import Any
 
 import numpy as np
 from matplotlib import rcParams
@@ -11,20 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.font_manager import FontProperties
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch
-from matplotlib.patheffects import withStroke
 from matplotlib.textpath import text_to_path
 
-from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.demos.grid import BoolArray, FloatArray, Grid
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
-from navirl_cli.figures.style import INK, OBSTACLE_COLOUR, PERSON_COLOUR, panel_width_in
+from navirl_cli.figures.style import look, panel_width_in
 
 #: Borders of what is shown: x_min, x_max, y_min, y_max, m, map frame.
 Window = tuple[float, float, float, float]
 
-#: Around the paths this much of the map is shown, m.
-MARGIN_M = 1.5
+#: Around the paths this much of the map is shown, m; of a map that is cropped to them, this much.
+MARGIN_M, CROPPED_M = 1.5, 0.5
+#: Between a person's outline and the border of a cropped map, m.
+_CLEAR_M = 0.1
 #: A map that is larger than the paths' surroundings by less than this factor of area is shown whole.
 CROP_FROM = 2.0
 #: Width of a legend's handle with the space around it, and of what a legend adds around its columns, inches.
@@ -33,37 +31,6 @@ _HANDLE_IN, _AROUND_IN = 0.265, 0.04
 _LEGEND_SHARE = 0.92
 #: Space that ticks and label take below the axes, in sizes of the legend's font.
 _BELOW = 4.0
-
-#: Looks of markers and lines, on the map and in the legend.
-_START: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 3.5,
-    "markerfacecolor": "white",
-    "markeredgecolor": INK,
-    "markeredgewidth": 0.8,
-    "label": "start",
-}
-_GOAL: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "*",
-    "markersize": 8,
-    "markerfacecolor": INK,
-    "markeredgecolor": "white",
-    "markeredgewidth": 0.5,
-    "label": "goal",
-}
-_NOMINAL: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (4, 2)), "label": "nominal path"}
-_HALO = (withStroke(linewidth=2.2, foreground="white"),)
-#: Outline of a person on a white map, and on colours, where it has to differ from the robot's and hides nothing.
-_PERSON: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 0.8, "zorder": 4}
-_PERSON_ON_COLOURS: dict[str, Any] = {
-    **_PERSON,
-    "linewidth": 1.2,
-    "path_effects": (withStroke(linewidth=2.4, foreground="white"),),
-}
-#: How opaque people are together where all of them overlap.
-_OPACITY = 0.9
 
 
 def window_around(grids: Sequence[Grid], points_m: FloatArray, margin_m: float = MARGIN_M) -> Window:
@@ -78,14 +45,53 @@ def window_around(grids: Sequence[Grid], points_m: FloatArray, margin_m: float =
     Returns:
         Borders in m, within the maps'.
     """
-    extents = np.array([grid.extent_m for grid in grids])
-    first, last = extents[:, ::2].min(axis=0), extents[:, 1::2].max(axis=0)
+    whole, near = _borders(grids), _surroundings(grids, points_m, margin_m)
+    return near if _area(whole) >= CROP_FROM * _area(near) else whole
+
+
+def cropped_to(grids: Sequence[Grid], paths_m: FloatArray, people_m: FloatArray) -> Window:
+    """The part of the map in which paths lie, however small the rest, with the people whom they come near.
+
+    Args:
+        grids: One or several maps in one frame.
+        paths_m: (n, 2) points of paths, m, map frame; as far as they are on the maps.
+        people_m: (p, 2) m, map frame: who stands within MARGIN_M of the paths' bounding box is seen whole.
+
+    Returns:
+        Borders in m, within the maps', CROPPED_M around the paths.
+    """
+    low, high = paths_m.min(axis=0) - MARGIN_M, paths_m.max(axis=0) + MARGIN_M
+    near = people_m[((people_m >= low) & (people_m <= high)).all(axis=1)]
+    reach = PERSON_RADIUS_M + _CLEAR_M
+    edges = (paths_m - CROPPED_M, paths_m + CROPPED_M, near - reach, near + reach)
+    return _surroundings(grids, np.concatenate(edges), 0.0)
+
+
+def inside(window: Window, points_m: FloatArray, beyond_m: float = 0.0) -> BoolArray:
+    """(n,) whether (n, 2) points, m, map frame, lie in a window, or at most so far beyond it."""
+    (x, y), (x0, x1, y0, y1) = points_m.T, window
+    within: BoolArray = (x > x0 - beyond_m) & (x < x1 + beyond_m) & (y > y0 - beyond_m) & (y < y1 + beyond_m)
+    return within
+
+
+def _borders(grids: Sequence[Grid]) -> Window:
+    """Borders of all maps together."""
+    x0, x1, y0, y1 = np.array([grid.extent_m for grid in grids]).T
+    return float(x0.min()), float(x1.max()), float(y0.min()), float(y1.max())
+
+
+def _surroundings(grids: Sequence[Grid], points_m: FloatArray, margin_m: float) -> Window:
+    """Borders of points with a margin around them, within the maps'."""
+    whole = _borders(grids)
+    first, last = np.array(whole[::2]), np.array(whole[1::2])
     seen = np.clip(points_m, first, last)
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    near_first, near_last = np.maximum(low - margin_m, first), np.minimum(high + margin_m, last)
-    if np.prod(last - first) >= CROP_FROM * np.prod(near_last - near_first):
-        first, last = near_first, near_last
-    return float(first[0]), float(last[0]), float(first[1]), float(last[1])
+    low, high = np.maximum(seen.min(axis=0) - margin_m, first), np.minimum(seen.max(axis=0) + margin_m, last)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def _area(window: Window) -> float:
+    """Of a window, m^2."""
+    return (window[1] - window[0]) * (window[3] - window[2])
 
 
 def frame(axes: Axes, window: Window, title: str = "") -> None:
@@ -107,62 +113,13 @@ def draw_obstacles(axes: Axes, grid: Grid) -> AxesImage:
     shown = np.ma.masked_where(~grid.occupied, grid.occupied)
     return axes.imshow(
         shown,
-        cmap=ListedColormap([OBSTACLE_COLOUR]),
+        cmap=ListedColormap([look().obstacle]),
         extent=grid.extent_m,
         origin="lower",
         interpolation="nearest",
         rasterized=True,
         zorder=1,
     )
-
-
-def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circle]:
-    """Draw (p, 2) people, m, map frame, as circles to scale.
-
-    Filled ones lie below the paths, and are the more translucent the more there are: where people of several trials
-    overlap, all outlines are seen. Others are an outline that hides nothing of the colours below.
-
-    Returns:
-        The outlines.
-    """
-    opacity = 1 - (1 - _OPACITY) ** (1 / max(1, len(people_m)))
-    if filled:
-        for x, y in people_m:
-            axes.add_patch(Circle((x, y), PERSON_RADIUS_M, facecolor=(PERSON_COLOUR, opacity), linewidth=0, zorder=2))
-    look = _PERSON if filled else _PERSON_ON_COLOURS
-    outlines = [Circle((x, y), PERSON_RADIUS_M, **look) for x, y in people_m]
-    for outline in outlines:
-        axes.add_patch(outline)
-    return outlines
-
-
-def draw_starts(axes: Axes, starts_m: FloatArray, robot_radius_m: float | None) -> tuple[Line2D, list[Circle]]:
-    """Mark (k, 2) starts, m, map frame; where the robot's radius is known, its outline is drawn to scale.
-
-    Starts within a radius of each other share an outline.
-
-    Returns:
-        The markers and the outlines.
-    """
-    outlines: list[Circle] = []
-    for x, y in starts_m if robot_radius_m else ():
-        if all(np.hypot(x - o.center[0], y - o.center[1]) >= robot_radius_m for o in outlines):
-            outlines.append(Circle((x, y), robot_radius_m or 0.0, fill=False, edgecolor=INK, linewidth=0.6, zorder=5))
-            axes.add_patch(outlines[-1])
-    (markers,) = axes.plot(*starts_m.T, zorder=6, **_START)
-    return markers, outlines
-
-
-def draw_goals(axes: Axes, goals_m: FloatArray) -> Line2D:
-    """Mark (k, 2) goals, m, map frame."""
-    (markers,) = axes.plot(*goals_m.T, zorder=6, **_GOAL)
-    return markers
-
-
-def draw_nominal(axes: Axes, line_m: FloatArray) -> Line2D:
-    """Draw the nominal path, a (k, 2) line, m, map frame, legible on any colour."""
-    (line,) = axes.plot(*line_m.T, zorder=3, path_effects=_HALO, **_NOMINAL)
-    return line
 
 
 def legend_below(axes: Axes, handles: Sequence[Artist]) -> None:
@@ -181,20 +138,3 @@ def _legend_width_in(labels: Sequence[str], columns: int) -> float:
     points = [text_to_path.get_text_width_height_descent(label, font, ismath=False)[0] for label in labels]
     split = np.array_split(np.array(points) / 72, columns)
     return _AROUND_IN + sum(_HANDLE_IN + float(column.max()) for column in split)
-
-
-def ground_handles(
-    people: Sequence[Circle], outlines: Sequence[Circle], *, nominal: bool, filled: bool
-) -> list[Artist]:
-    """Legend entries of what is there: obstacles, start, goal, and people, robot and nominal path where drawn."""
-    disc: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 7, "markeredgecolor": INK}
-    handles: list[Artist] = [Line2D([], [], **_NOMINAL)] if nominal else []
-    handles += [Line2D([], [], **_START), Line2D([], [], **_GOAL)]
-    if outlines:
-        handles.append(Line2D([], [], label="robot", markerfacecolor="white", markeredgewidth=0.6, **disc))
-    if people:
-        label = "person" if len(people) == 1 else f"person ({len(people)} places)"
-        colour, look = (PERSON_COLOUR, _PERSON) if filled else ("none", _PERSON_ON_COLOURS)
-        edge_pt = look["linewidth"]
-        handles.append(Line2D([], [], label=label, markerfacecolor=colour, markeredgewidth=edge_pt, **disc))
-    return [*handles, Patch(facecolor=OBSTACLE_COLOUR, label="obstacle, inflated")]

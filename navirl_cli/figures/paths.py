@@ -1,6 +1,6 @@
 """All demonstrated paths over their map (Fig. 3)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,23 +15,16 @@ from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.demos.grid import FloatArray, Grid
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import by_group
-from navirl_cli.figures.ground import (
-    Window,
-    draw_goals,
-    draw_obstacles,
-    draw_people,
-    draw_starts,
-    frame,
-    ground_handles,
-    legend_below,
-    window_around,
-)
+from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, legend_below, window_around
+from navirl_cli.figures.marks import Marks, Places, draw_marks
 from navirl_cli.figures.style import colour_of, house_style
 
 #: Widths of a path and of its stretches in contact, points.
 _PATH_PT, _CONTACT_PT = 0.7, 1.7
 #: People nearer to each other than this are one, m.
 _SAME_M = 0.02
+#: Lines of paths with people at one place, at another, and so on; of more places than this all are alike.
+_LINES: tuple[Any, ...] = ("-", (0, (5, 1.2)), (0, (1.2, 0.9)), (0, (5, 1.2, 1.2, 1.2)))
 
 
 @dataclass(frozen=True)
@@ -49,6 +42,7 @@ class DrawnPaths:
     people: list[Circle]
     #: Outlines of the robot where paths start.
     robots: list[Circle]
+    marks: Marks
 
 
 @house_style()
@@ -57,17 +51,23 @@ def draw_paths(
     demonstrations: Sequence[Demonstration],
     *,
     window_m: Window | None = None,
+    crop: bool = False,
     title: str = "",
     legend: bool = True,
+    among: Sequence[Demonstration] = (),
 ) -> DrawnPaths:
     """Draw the driven paths of demonstrations, one colour a group, thicker where the person pushed.
+
+    Where trials have people at different places, paths and the people of their trials have the same kind of line.
 
     Args:
         axes: Where to draw.
         demonstrations: All in the same map frame.
         window_m: Borders of what is shown, m; None: around the paths, or the whole map where it is not much larger.
+        crop: Show no more than the paths' surroundings, where no window is given.
         title: Title of the panel.
         legend: Whether to put a legend below.
+        among: Those of all panels beside each other, so that one kind of line means one place in all of them.
 
     Returns:
         The artists.
@@ -79,23 +79,40 @@ def draw_paths(
         raise DemonstrationError("no demonstration to draw")
     grids = _maps(demonstrations)
     obstacles = [draw_obstacles(axes, grid) for grid in grids]
-    groups = by_group(demonstrations)
+    groups, line_of = by_group(demonstrations), _lines_of([*among, *demonstrations])
     lines, contacts = [], []
     for group, members in groups.items():
         for one in members:
             contacts.extend(_contacts(axes, one, colour_of(group)))
-            lines.append(_path(axes, one, colour_of(group)))
-    people = draw_people(axes, _distinct(np.concatenate([one.people_m for one in demonstrations])), filled=True)
+            lines.append(_path(axes, one, colour_of(group), line_of[_places(one)]))
+    window = window_of(demonstrations, crop=crop) if window_m is None else window_m
+    people = _distinct(np.concatenate([one.people_m for one in demonstrations]))
     starts = np.array([one.xy_m[0] for one in demonstrations])
-    _, robots = draw_starts(axes, starts, max(one.robot_radius_m for one in demonstrations))
     goals = np.unique([one.goal_m for one in demonstrations], axis=0)
-    draw_goals(axes, goals)
-    seen = np.concatenate([*(one.xy_m for one in demonstrations), goals])
-    frame(axes, window_around(grids, seen) if window_m is None else window_m, title)
+    places = Places(starts, goals, people, max(one.robot_radius_m for one in demonstrations))
+    same = [_line_of_person(person, line_of) for person in people]
+    marks = draw_marks(axes, window, places, lines=same, title=title)
     if legend:
-        marks = ground_handles(people, robots, nominal=False, filled=True)
-        legend_below(axes, [*_group_handles(groups, in_contact=bool(contacts)), *marks])
-    return DrawnPaths(axes, obstacles, lines, contacts, people, robots)
+        contact = [contact_handle()] if contacts else []
+        counts = {group: len(members) for group, members in groups.items()}
+        legend_below(axes, [*group_handles(groups, counts), *contact, *marks.handles()])
+    return DrawnPaths(axes, obstacles, lines, contacts, marks.people, marks.robots, marks)
+
+
+def window_of(demonstrations: Sequence[Demonstration], *, crop: bool) -> Window:
+    """What to show of demonstrations: their paths and goals, and the surroundings.
+
+    Args:
+        demonstrations: All in the same map frame.
+        crop: Whether to show no more than the paths' surroundings.
+
+    Returns:
+        Borders, m.
+    """
+    grids, paths = _maps(demonstrations), np.concatenate([one.xy_m for one in demonstrations])
+    if crop:
+        return cropped_to(grids, paths, np.concatenate([one.people_m for one in demonstrations]))
+    return window_around(grids, np.concatenate([paths, [one.goal_m for one in demonstrations]]))
 
 
 def _maps(demonstrations: Iterable[Demonstration]) -> list[Grid]:
@@ -114,9 +131,29 @@ def _distinct(points_m: FloatArray) -> FloatArray:
     return points_m[np.sort(first)]
 
 
-def _path(axes: Axes, one: Demonstration, colour: str) -> Line2D:
+def _places(one: Demonstration) -> tuple[tuple[int, int], ...]:
+    """Where the people of a trial stand; equal for trials with people at the same places."""
+    return tuple(sorted((int(x), int(y)) for x, y in np.round(one.people_m / _SAME_M)))
+
+
+def _lines_of(demonstrations: Iterable[Demonstration]) -> dict[tuple[tuple[int, int], ...], Any]:
+    """Kinds of line by the places of people; all alike where there are too many of them."""
+    known = dict.fromkeys(_places(one) for one in demonstrations)
+    peopled = [places for places in known if places]
+    lines = _LINES if len(peopled) <= len(_LINES) else _LINES[:1] * len(peopled)
+    return {**dict.fromkeys(known, _LINES[0]), **dict(zip(peopled, lines, strict=False))}
+
+
+def _line_of_person(person_m: FloatArray, line_of: dict[tuple[tuple[int, int], ...], Any]) -> Any:
+    """The line of the only trials in which a (2,) person stands there, m; the plain one of who stands in several."""
+    x, y = np.round(person_m / _SAME_M)
+    lines = [line for places, line in line_of.items() if (int(x), int(y)) in places]
+    return lines[0] if len(lines) == 1 else _LINES[0]
+
+
+def _path(axes: Axes, one: Demonstration, colour: str, kind: Any) -> Line2D:
     """One driven path."""
-    (line,) = axes.plot(*one.xy_m.T, color=colour, linewidth=_PATH_PT, zorder=3)
+    (line,) = axes.plot(*one.xy_m.T, color=colour, linewidth=_PATH_PT, linestyle=kind, zorder=3)
     return line
 
 
@@ -133,13 +170,12 @@ def _stretch(one: Demonstration, contact: Contact) -> FloatArray:
     return np.stack([np.interp(at, one.t_s, axis) for axis in one.xy_m.T], axis=1)
 
 
-def _group_handles(groups: dict[str, list[Demonstration]], *, in_contact: bool) -> list[Artist]:
-    """Legend entries of the groups with their numbers of paths, and of contact."""
-    handles: list[Artist] = [
-        Line2D([], [], color=colour_of(group), linewidth=1.0, label=f"{group} (n = {len(members)})")
-        for group, members in groups.items()
-    ]
-    if in_contact:
-        grey: dict[str, Any] = {"color": "0.3", "linewidth": _CONTACT_PT}
-        handles.append(Line2D([], [], label="in contact", **grey))
-    return handles
+def group_handles(groups: Iterable[str], counts: Mapping[str, int] | None = None) -> list[Artist]:
+    """Legend entries of groups, with their numbers of paths where told."""
+    labels = {group: group if counts is None else f"{group} (n = {counts[group]})" for group in groups}
+    return [Line2D([], [], color=colour_of(group), linewidth=1.0, label=label) for group, label in labels.items()]
+
+
+def contact_handle() -> Artist:
+    """Legend entry of the stretches in contact, whatever their group."""
+    return Line2D([], [], color="0.5", linewidth=_CONTACT_PT, label="in contact")

@@ -7,12 +7,12 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
-from matplotlib.patches import Circle
 
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import SceneError
-from navirl_cli.figures.cells import DrawnCells, draw_policy, draw_reward
-from navirl_cli.figures.ground import ground_handles
+from navirl_cli.figures.cells import EXTEND, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.ground import Window
+from navirl_cli.figures.marks import merged_handles
 from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
 from navirl_cli.irl.scene import Scene
@@ -23,8 +23,6 @@ TitledScene = tuple[str, Scene, FloatArray, FloatArray]
 VISITS, REWARD = "expected visits", "state reward per step (without cost of way)"
 #: Mean width of a letter, of what stands beside a map, and thickness of a colour bar, inches.
 _LETTER_IN, _BESIDE_IN, _BAR_IN = 0.055, 0.35, 0.08
-#: Pointed ends of a colour bar, by whether cells lie below and above its range.
-_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 
 @dataclass(frozen=True)
@@ -39,16 +37,19 @@ class DrawnPolicies:
 
 
 @house_style()
-def draw_policy_and_reward(axes: Sequence[Axes], scenes: Sequence[TitledScene], robot_radius_m: float) -> DrawnPolicies:
+def draw_policy_and_reward(
+    axes: Sequence[Axes], scenes: Sequence[TitledScene], robot_radius_m: float, window_m: Window | None = None
+) -> DrawnPolicies:
     """Draw where a policy leads and the reward that it follows side by side, a row for each scene.
 
     Equal colours are equal numbers in all scenes: one colour bar stands above all policies and one above all rewards.
 
     Args:
         axes: Two for each scene in rows of two, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
-        scenes: Title, scene, (n,) expected visits by state from its start, and (n,) reward of a step in every state;
-            all under one reward.
+        scenes: Title, scene, (n,) expected visits by state from its start, and (n,) reward of a step in every state:
+            several scenes under one reward, or one scene under several.
         robot_radius_m: Draws the robot at its start to scale, m.
+        window_m: Borders of what every map shows, m; None: around each scene's paths.
 
     Returns:
         The artists.
@@ -62,16 +63,14 @@ def draw_policy_and_reward(axes: Sequence[Axes], scenes: Sequence[TitledScene], 
     policies, rewards = [], []
     look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False}
     for (title, scene, visits, reward), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
-        policies.append(draw_policy(left, scene, visits, **look))
+        policies.append(draw_policy(left, scene, visits, window_m=window_m, **look))
         rewards.append(draw_reward(right, scene, reward, window_m=policies[-1].window_m, **look))
         # The title is the row's: it may reach over the panel on the right, which has none.
         left.set_title(fill(title, int(2 * (panel_width_in(left) - _BESIDE_IN) / _LETTER_IN)), loc="left")
     alike = len({drawn.window_m for drawn in policies}) == 1
     for rows in [axes] if alike else [axes[at : at + 2] for at in range(0, len(axes), 2)]:
         outer_labels(rows)
-    everybody = [person for drawn in policies for person in drawn.people]
-    robots = [Circle((0.0, 0.0), robot_radius_m)]
-    handles = ground_handles(everybody[:1], robots, nominal=True, filled=False)
+    handles = merged_handles([drawn.marks for drawn in policies])
     return DrawnPolicies(_share(policies, VISITS), _share(rewards, REWARD), common_legend(axes, handles))
 
 
@@ -88,7 +87,7 @@ def _share(drawn: Sequence[DrawnCells], label: str) -> list[DrawnCells]:
     width_in = panel_width_in(panels[0])
     height_in = len(drawn) * (width_in - _BESIDE_IN) * (window[3] - window[2]) / (window[1] - window[0])
     place: dict[str, Any] = {"location": "top", "pad": PAD_IN / height_in, "aspect": width_in / _BAR_IN}
-    look: dict[str, Any] = {"extend": _EXTEND[ends], "extendfrac": 0.03, "format": first.formatter}
+    look: dict[str, Any] = {"extend": EXTEND[ends], "extendfrac": 0.03, "format": first.formatter}
     bar = panels[0].figure.colorbar(drawn[0].image, ax=panels, **place, **look)
     bar.outline.set_linewidth(0.5)
     bar.set_label(fill(label, int((width_in - _BESIDE_IN) / _LETTER_IN)), labelpad=4.0)

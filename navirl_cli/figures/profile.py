@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.sheet import new_figure
-from navirl_cli.figures.style import COLOURS, INK, PAGE_IN, house_style, panel_width_in
+from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look, panel_width_in
 from navirl_cli.irl.profile import Profile, fall_at
 
 #: The parameters as the paper writes them.
@@ -70,15 +70,15 @@ def draw_profile(axes: Axes, profile: Profile, unit: str) -> None:
     """
     if float(profile.relative.max() - profile.relative.min()) <= 0:
         raise ArtefactError(f"the profile of {profile.name} is flat: there is nothing to draw")
-    fall, colour = fall_at(profile.level), COLOURS["learnt"]
+    fall, colour = fall_at(profile.level), colour_of("learnt")
     top = int(np.argmax(profile.relative))
     best = float(profile.values[top])
     root = np.sqrt(profile.relative[top] - profile.relative) * np.sign(profile.values - best)
     dense = np.linspace(profile.values[0], profile.values[-1], 400)
     axes.plot(dense, -(np.interp(dense, profile.values, root) ** 2), color=colour, linewidth=1.2, zorder=3)
     axes.plot(profile.values, profile.relative, "o", color=colour, markersize=2.2, zorder=3)
-    axes.axhline(-fall, color=INK, linewidth=0.6, linestyle=(0, (4, 2)))
-    axes.axvline(best, color=INK, linewidth=0.6)
+    axes.axhline(-fall, color=look().ink, linewidth=0.6, linestyle=(0, (4, 2)))
+    axes.axvline(best, color=look().ink, linewidth=0.6)
     low = profile.values[0] if profile.lower is None else profile.lower
     high = profile.values[-1] if profile.upper is None else profile.upper
     axes.axvspan(float(low), float(high), color=colour, alpha=0.15, linewidth=0)

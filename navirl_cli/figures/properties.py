@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
-from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
+from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
 #: What the figure says of itself.
 NOTE = "bars: mean, whiskers: standard deviation"
@@ -29,7 +29,7 @@ _LINE_IN, _BETWEEN_IN = 0.125, 0.06
 _BELOW_IN, _NARROW_IN, _SHORT = 0.58, 1.8, 13
 #: Most intervals between ticks; the share of a panel's width in which they stand, and room between numbers, inches.
 _INTERVALS, _TICKED, _APART_IN = 4, 0.68, 0.04
-_WHISKER: dict[str, Any] = {"ecolor": INK, "elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8}
+_WHISKER: dict[str, Any] = {"elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8}
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,9 @@ def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarC
     mean = np.array([bar.mean[metric.name] for bar in bars], dtype=float)
     std = np.array([bar.std[metric.name] for bar in bars], dtype=float)
     colours = [colour_of(bar.key) for bar in bars]
-    drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=INK, linewidth=0.5, error_kw=_WHISKER)
+    ink = look().ink
+    whisker = {**_WHISKER, "ecolor": ink}
+    drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=ink, linewidth=0.5, error_kw=whisker)
     for y in at[np.isnan(mean)]:
         axes.annotate("none", (0.0, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
     narrow = panel_width_in(axes) < _NARROW_IN
@@ -119,7 +121,7 @@ def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarC
     low, high = _limits(mean, std)
     axes.set_xlim(low, high)
     axes.set_xticks(*_ticks(low, high, _TICKED * panel_width_in(axes)))
-    axes.axvline(0.0, color=INK, linewidth=0.6)
+    axes.axvline(0.0, color=ink, linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
     axes.set_yticks(at, [""] * len(bars))

@@ -17,7 +17,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 
 from navirl_cli.errors import ArtefactError
-from navirl_cli.figures.style import COLUMN_IN, DPI, house_style
+from navirl_cli.figures.style import COLUMN_IN, house_style, look
 from navirl_cli.files import check_writable, replacing
 
 #: What writes each format; none of them needs a display.
@@ -190,6 +190,6 @@ def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool =
     if trim:
         trim_height(figure)
     page = BytesIO()
-    CANVASES[extension](figure).print_figure(page, format=extension, dpi=DPI, metadata=dict(METADATA[extension]))
+    CANVASES[extension](figure).print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
     with replacing(path, force=force) as part:
         part.write_bytes(page.getvalue())

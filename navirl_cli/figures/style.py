@@ -1,7 +1,9 @@
-"""What all figures share: sizes of a page, fonts, and one colour for one thing."""
+"""What all figures share: sizes of a page, fonts, looks for paper and screen, and one colour for one thing."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -18,9 +20,7 @@ COLUMN_IN, PAGE_IN = 3.5, 7.16
 #: Resolution of bitmaps, and of images inside vector files, dots per inch.
 DPI = 300
 
-#: Grey levels and colours of what is no condition.
-OBSTACLE_COLOUR = "#D4D4D4"
-PERSON_COLOUR = "#F0E442"
+#: Ink on paper; what is drawn in other looks too asks :func:`look` for its ink.
 INK = "#000000"
 #: Colour of whatever is none of COLOURS.
 OTHER_COLOUR = "#8C8C8C"
@@ -45,6 +45,54 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "nominal": "#BFBFBF",
     }
 )
+
+#: The same hues on near-black: light where they were dark, and force's cycles from light to dark as on paper.
+DARK_COLOURS: Mapping[str, str] = MappingProxyType(
+    {
+        "force": "#45A3E8",
+        "force, cycle 1": "#C2E4F9",
+        "force, cycle 2": "#45A3E8",
+        "force, later cycles": "#1A679F",
+        "joystick": "#F47B20",
+        "autonomous": "#22E0AA",
+        "learnt": "#DE86B9",
+        "replay of the learnt policy": "#B9508E",
+        "replay of the joystick": "#A9581F",
+        "avoidance": "#F3B63A",
+        "obstacle avoidance": "#F3B63A",
+        "driven": "#D6D6D6",
+        "driven, on grid": "#A6A6A6",
+        "nominal": "#7D7D7D",
+    }
+)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How figures look on what they are shown on; their sizes in inches do not depend on it."""
+
+    #: Colours of lines and letters, of what they stand on, of obstacles and of people.
+    ink: str
+    paper: str
+    obstacle: str
+    person: str
+    #: Colours by key, as :data:`COLOURS`.
+    colours: Mapping[str, str]
+    #: Colour map of numbers that are the stronger the higher they are, and the colour of what is below its range.
+    intensity: str
+    #: Resolution of bitmaps, and of images inside vector files, dots per inch.
+    dpi: int
+
+
+#: For print, for a bright screen (twice the pixels), and for a dark one, as slides have.
+LOOKS: Mapping[str, Look] = MappingProxyType(
+    {
+        "paper": Look(INK, "#FFFFFF", "#D4D4D4", "#F0E442", COLOURS, "viridis_r", DPI),
+        "screen": Look(INK, "#FFFFFF", "#D4D4D4", "#F0E442", COLOURS, "viridis_r", 2 * DPI),
+        "dark": Look("#E8E8E8", "#141414", "#454545", "#8A8200", DARK_COLOURS, "viridis", 2 * DPI),
+    }
+)
+_LOOK: ContextVar[Look] = ContextVar("look", default=LOOKS["paper"])
 
 #: Colours of a scale from disagreement over neutral to agreement, and how far from the middle its ends lie: the dark
 #: end of agreement is the darker one, so that grey print keeps the two sides apart.
@@ -76,13 +124,38 @@ _STYLE: Mapping[Any, Any] = MappingProxyType(
         "legend.labelspacing": 0.35,
         "text.parse_math": False,
         "figure.dpi": 100,
-        "savefig.dpi": DPI,
         "pdf.fonttype": 42,
         "ps.fonttype": 42,
         "svg.fonttype": "none",
         "svg.hashsalt": "navirl",
     }
 )
+#: Settings that have the colour of the ink and of the paper.
+_COLOURED: Mapping[str, tuple[Any, ...]] = MappingProxyType(
+    {
+        "ink": ("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color", "patch.edgecolor"),
+        "paper": ("figure.facecolor", "axes.facecolor"),
+    }
+)
+
+
+def look() -> Look:
+    """The look in which figures are drawn now."""
+    return _LOOK.get()
+
+
+@contextmanager
+def styled(name: str) -> Iterator[None]:
+    """Draw, open and save figures in one of LOOKS for as long as the context lasts; on paper else.
+
+    Args:
+        name: A key of LOOKS.
+    """
+    token = _LOOK.set(LOOKS[name])
+    try:
+        yield
+    finally:
+        _LOOK.reset(token)
 
 
 @contextmanager
@@ -94,6 +167,8 @@ def house_style() -> Iterator[None]:
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
+        for part, colour in (("ink", look().ink), ("paper", look().paper)):
+            mpl.rcParams.update(dict.fromkeys(_COLOURED[part], colour))
         yield
 
 
@@ -106,12 +181,12 @@ def colour_of(key: str) -> str:
             unknown is grey.
 
     Returns:
-        The colour as #RRGGBB.
+        The colour as #RRGGBB, the same hue in every look.
     """
-    condition, *rest = key.split(", ")
+    colours, (condition, *rest) = look().colours, key.split(", ")
     if condition == Condition.FORCE and rest and rest[0].startswith("cycle "):
-        return COLOURS.get(f"{condition}, {rest[0]}", COLOURS["force, later cycles"])
-    return COLOURS.get(key, COLOURS.get(condition, OTHER_COLOUR))
+        return colours.get(f"{condition}, {rest[0]}", colours["force, later cycles"])
+    return colours.get(key, colours.get(condition, OTHER_COLOUR))
 
 
 def level_colours(levels: int) -> list[str]:

@@ -1,0 +1,96 @@
+"""What every command of ``navirl plot`` takes: where to write, how wide, for paper or for a screen."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+from navirl_cli.commands.shared import FilePath, Function, force_option, output_option
+
+#: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is not imported before a figure is drawn.
+STYLES = ("paper", "screen", "dark")
+
+
+@dataclass(frozen=True)
+class Page:
+    """Where a figure goes and how it looks."""
+
+    output: Path
+    wide: bool
+    style: str
+    force: bool
+
+    @property
+    def width_in(self) -> float:
+        """Width of one column or of a page of two, inches."""
+        from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
+
+        return PAGE_IN if self.wide else COLUMN_IN
+
+    @contextmanager
+    def look(self) -> Iterator[None]:
+        """Draw in the style that was asked for."""
+        from navirl_cli.figures.style import styled
+
+        with styled(self.style):
+            yield
+
+    def save(self, figure: Any, *, trim: bool = True) -> None:
+        """Save a figure and say where; with ``trim`` without empty height."""
+        from navirl_cli.figures.sheet import save_figure
+
+        with self.look():
+            save_figure(figure, self.output, force=self.force, trim=trim)
+        click.echo(self.output)
+
+    def draw(
+        self,
+        draw: Callable[[list[Any]], object],
+        *,
+        height_in: float | None = None,
+        panels: int = 1,
+        columns: int | None = None,
+    ) -> None:
+        """Open a figure, draw on it, save it; one of no given height is as high as its maps need."""
+        from navirl_cli.figures.sheet import new_figure
+
+        with self.look():
+            figure, axes = new_figure(self.width_in, height_in, panels, columns)
+            draw(axes)
+        self.save(figure, trim=height_in is None)
+
+
+def page_options(function: Function) -> Function:
+    """Options of every figure, handed over as ``page``; what cannot be written is refused before any work."""
+
+    @wraps(function)
+    def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
+        from navirl_cli.figures.sheet import check_target
+
+        check_target(output, force=force)
+        return function(page=Page(output, wide, style, force), **others)
+
+    options = (
+        output_option("Figure to write: .png, .pdf or .svg."),
+        click.option("--wide", is_flag=True, help="As wide as a page of two columns (7.16 in), not one (3.5 in)."),
+        click.option(
+            "--style",
+            type=click.Choice(STYLES),
+            default="paper",
+            show_default=True,
+            help="screen: twice the pixels; dark: light ink on near-black, and twice the pixels.",
+        ),
+        force_option,
+    )
+    for decorate in reversed(options):
+        packed = decorate(packed)
+    return packed  # type: ignore[return-value]
+
+
+crop_option = click.option("--crop", is_flag=True, help="Show no more of the map than what surrounds the paths.")
+trial_option = click.option("--trial", help="Draw this trial, e.g. p01/3; the first one by default.")
+reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")

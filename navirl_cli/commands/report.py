@@ -1,0 +1,79 @@
+"""``navirl report``: one page on demonstrations and what was learnt from them, to send to a colleague."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import click
+
+from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.commands.shared import (
+    FilePath,
+    demonstrations_in,
+    demos_argument,
+    finish,
+    force_option,
+    output_option,
+    progress_bar,
+    seed_option,
+)
+from navirl_cli.errors import ArtefactError
+from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.files import check_writable, replacing
+
+
+@click.command()
+@demos_argument
+@click.argument("reward", type=FilePath)
+@output_option("Page to write: .html.")
+@click.option(
+    "--samples",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(2, MOST),
+    help="Paths drawn from the learnt policy in each scene.",
+)
+@seed_option
+@force_option
+def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
+    """Tell what was learnt, in one HTML page without anything from elsewhere.
+
+    Parameters with intervals and what they mean in metres, warnings, metrics of driven and learnt paths, how typical
+    the demonstrations are of the policy, figures, trials, and what everything was made from. Light and dark, for
+    screens, phones and paper; tables sort by a click, figures open large.
+    """
+    import numpy as np
+
+    from navirl_cli.commands.report_text import report_of
+    from navirl_cli.evaluation.compare import compare
+    from navirl_cli.evaluation.ranks import ranks_of
+    from navirl_cli.figures.report import draw_report
+    from navirl_cli.reports.page import to_html
+
+    if output.suffix != ".html":
+        raise ArtefactError(f"{output}: expected a name that ends in .html, found {output.suffix!r}")
+    check_writable(output, force=force)
+    demonstrations = demonstrations_in(demos)
+    learnt = read_reward_for(reward, demonstrations)
+    rng = np.random.default_rng(seed)
+    with progress_bar("evaluate", len(demonstrations)) as update:
+        result = compare(
+            demonstrations,
+            {"learnt": learnt.reward},
+            Precision(samples),
+            rng,
+            progress=lambda done, _all: update(done, ""),
+        )
+    ranks = ranks_of(demonstrations, learnt.reward, samples, rng)
+    taught = [one for one in demonstrations if one.id in learnt.demonstrations] or demonstrations
+    with TemporaryDirectory() as folder:
+        figures = draw_report(demonstrations, learnt.reward, taught[0], result, learnt.profiles, Path(folder))
+        made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        content = report_of(
+            demonstrations, learnt, read_json(reward, "reward"), result, ranks, figures, made_from, seed
+        )
+        page = to_html(content)
+    with replacing(output, force=force) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    click.echo(output)
+    finish(result.notes)

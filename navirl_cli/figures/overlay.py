@@ -1,0 +1,75 @@
+"""Paths drawn thin over the numbers of a map: demonstrated ones, and ones drawn from a policy."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.figures.style import colour_of, look
+
+#: Width of a path and of the light border that parts it from the colours below, points; opacity of many paths.
+_PATH_PT, _HALO_PT = 0.7, 1.3
+_MANY, _OPACITY = 10, 0.6
+#: Starts farther from each other than this are different tasks, m.
+SAME_START_M = 0.25
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Paths of one kind."""
+
+    #: What they are, for the legend, and the key of their colour, as ``style.colour_of`` takes it.
+    label: str
+    key: str
+    #: Each (k, 2) m, map frame.
+    lines_m: Sequence[FloatArray]
+
+
+def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[Demonstration]:
+    """Demonstrations of one's task, itself included: on its map, with its people, from its start to its goal.
+
+    Starts may lie SAME_START_M apart, ends a robot's radius, people a person's.
+    """
+    return [other for other in demonstrations if _same_task(other, one)]
+
+
+def _same_task(one: Demonstration, other: Demonstration) -> bool:
+    """Whether two demonstrations answer the same task."""
+    maps = [(d.grid.shape, d.grid.resolution_m, d.grid.origin_m) for d in (one, other)]
+    if maps[0] != maps[1] or len(one.people_m) != len(other.people_m):
+        return False
+    start, end = np.hypot(*(one.xy_m[[0, -1]] - other.xy_m[[0, -1]]).T)
+    away = np.hypot(*(one.people_m[:, None] - other.people_m[None]).T)  # (p, p)
+    alone = away.size and max(away.min(axis=0).max(), away.min(axis=1).max()) > PERSON_RADIUS_M
+    return bool(start <= SAME_START_M and end <= other.robot_radius_m and not alone)
+
+
+def draw_overlays(axes: Axes, overlays: Iterable[Overlay]) -> list[Line2D]:
+    """Draw paths thin over a map; many of a kind let through what is below.
+
+    Returns:
+        A line for each path.
+    """
+    lines = []
+    for kind in overlays:
+        opacity = 1.0 if len(kind.lines_m) <= _MANY else _OPACITY
+        halo = withStroke(linewidth=_HALO_PT, foreground=look().paper, alpha=opacity / 2)
+        for line_m in kind.lines_m:
+            lines += axes.plot(*line_m.T, color=colour_of(kind.key), linewidth=_PATH_PT, alpha=opacity, zorder=3.5)
+            lines[-1].set_path_effects([halo])
+    return lines
+
+
+def overlay_handles(overlays: Iterable[Overlay]) -> list[Artist]:
+    """Legend entries with the numbers of paths."""
+    return [
+        Line2D([], [], color=colour_of(kind.key), linewidth=1.0, label=f"{kind.label} (n = {len(kind.lines_m)})")
+        for kind in overlays
+    ]

@@ -1,0 +1,74 @@
+"""Ranks of demonstrations among the paths of a policy: are they as uniform as those of its own paths would be?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.lines import Line2D
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.figures.ground import legend_below
+from navirl_cli.figures.style import colour_of, house_style, look
+
+#: Of the band.
+_OPACITY = 0.18
+
+
+@dataclass(frozen=True)
+class DrawnRanks:
+    """What :func:`draw_ranks` put on the axes."""
+
+    axes: Axes
+    #: Share of demonstrations with at most a rank.
+    steps: Line2D
+    uniform: Line2D
+    #: Where all of the steps lie with the level's probability, if ranks are uniform.
+    band: PolyCollection
+    #: Half of the band's height.
+    reach: float
+    p_value: float
+
+
+@house_style()
+def draw_ranks(axes: Axes, ranks: FloatArray, level: float = 0.95) -> DrawnRanks:
+    """Draw the distribution of ranks beside the uniform one, which demonstrations that come from the policy have.
+
+    Steps above the diagonal on the left are of paths that the policy hardly takes; steps below it until the right are
+    of paths that are more typical than paths are. The band holds all of the steps at once (Kolmogorov and Smirnov).
+
+    Args:
+        axes: Where to draw.
+        ranks: (n,) shares of the policy's paths that are less likely than each demonstration, in [0, 1].
+        level: Probability of the band.
+
+    Returns:
+        The artists.
+
+    Raises:
+        DemonstrationError: There is no rank, or one that is no share.
+    """
+    from scipy.stats import kstest, kstwo
+
+    if not len(ranks):
+        raise DemonstrationError("no ranks to draw")
+    if not ((ranks >= 0) & (ranks <= 1)).all():
+        raise DemonstrationError(f"ranks need to be shares from 0 to 1, found {ranks.min():g} to {ranks.max():g}")
+    count, p_value = len(ranks), float(kstest(ranks, "uniform").pvalue)
+    reach, ends = float(kstwo.ppf(level, count)), np.array([0.0, 1.0])
+    corners = np.array([0.0, reach, 1 - reach, 1.0])  # where the band meets 0 and 1
+    low, high = np.clip(corners - reach, 0, 1), np.clip(corners + reach, 0, 1)
+    name = f"{100 * level:g} % band of uniform ranks"
+    band = axes.fill_between(corners, low, high, color=look().ink, alpha=_OPACITY, linewidth=0, label=name)
+    (uniform,) = axes.plot(ends, ends, color=look().ink, linewidth=0.8, linestyle=(0, (4, 2)), label="uniform")
+    x = np.concatenate([[0.0], np.sort(ranks), [1.0]])
+    y = np.concatenate([[0.0], np.arange(1, count + 1) / count, [1.0]])
+    colour, label = colour_of("learnt"), "demonstrations"
+    (steps,) = axes.step(x, y, where="post", color=colour, linewidth=1.4, label=label, zorder=3)
+    axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="rank among the policy's paths", ylabel="share of demonstrations")
+    axes.set_box_aspect(0.6)
+    said = "p < 0.001" if p_value < 1e-3 else f"p = {p_value:.2g}"
+    axes.set_title(f"n = {count}, {said} (Kolmogorov and Smirnov)")
+    legend_below(axes, [steps, uniform, band])
+    return DrawnRanks(axes, steps, uniform, band, reach, p_value)

@@ -1,0 +1,68 @@
+"""The figures of a report on one learnt reward, as files."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, Comparison
+from navirl_cli.evaluation.metrics import PAPER_METRICS
+from navirl_cli.figures import properties
+from navirl_cli.figures.paths import draw_paths
+from navirl_cli.figures.policies import draw_policy_and_reward
+from navirl_cli.figures.profile import draw_profiles
+from navirl_cli.figures.sheet import new_figure, save_figure
+from navirl_cli.figures.style import PAGE_IN
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.profile import Profile
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import scenes_of
+
+
+def draw_report(
+    demonstrations: Sequence[Demonstration],
+    reward: Reward,
+    shown: Demonstration,
+    result: Comparison,
+    profiles: Sequence[Profile],
+    folder: Path,
+) -> dict[str, Path]:
+    """Draw paths, policy, properties and profiles.
+
+    Args:
+        demonstrations: All.
+        reward: What was learnt.
+        shown: Whose scene shows the policy.
+        result: Metrics, as :func:`navirl_cli.evaluation.compare.compare` gives them.
+        profiles: Profile likelihoods; none where none were followed.
+        folder: Where to write .png files.
+
+    Returns:
+        The files by name.
+    """
+    files = {name: folder / f"{name}.png" for name in ("paths", "policy", "properties", "profile")}
+    figure, axes = new_figure(PAGE_IN)
+    draw_paths(axes[0], demonstrations)
+    save_figure(figure, files["paths"])
+    scene = scenes_of([shown])[0]
+    visits = policy_of(reward, scene).visits(np.eye(1, scene.lattice.size, scene.start)[0])
+    figure, axes = new_figure(PAGE_IN, panels=2, columns=2)
+    draw_policy_and_reward(axes, [(f"scene of {shown.id}", scene, visits, reward.by_cell(scene))], shown.robot_radius_m)
+    save_figure(figure, files["policy"])
+    bars = [
+        properties.PropertyBar(
+            f"{row.group}, {row.kind}", LEARNT if row.kind == LEARNT else row.group, row.mean, row.std, row.count
+        )
+        for row in result.groups
+        if row.kind in {DRIVEN, ON_GRID, LEARNT}
+    ]
+    figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
+    properties.draw_properties(axes, bars)
+    save_figure(figure, files["properties"], trim=False)
+    if profiles:
+        units = {parameter.name: parameter.unit for parameter in reward.parameters}
+        save_figure(draw_profiles(profiles, units, PAGE_IN), files["profile"], trim=False)
+    else:
+        del files["profile"]
+    return files

@@ -1,0 +1,74 @@
+"""The soft value of every state over the map."""
+
+from dataclasses import dataclass
+from typing import Unpack
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.contour import QuadContourSet
+from matplotlib.ticker import MaxNLocator
+
+from navirl_cli.demos.grid import FloatArray
+from navirl_cli.figures.cells import (
+    CellOptions,
+    DrawnCells,
+    check_states,
+    draw_bar,
+    draw_image,
+    draw_scene,
+    scene_window,
+    shown_states,
+    table_of,
+)
+from navirl_cli.figures.style import INK, house_style
+from navirl_cli.irl.scene import Scene
+
+#: Pale at the goal; light enough everywhere for dark contour lines.
+VALUE_MAP = LinearSegmentedColormap.from_list("value", colormaps["YlGnBu_r"](np.linspace(0.35, 1.0, 256)))
+#: Most contour lines.
+_CONTOURS = 12
+
+
+@dataclass(frozen=True)
+class DrawnValue(DrawnCells):
+    """What :func:`draw_value` put on the axes."""
+
+    #: Lines of equal value, at round numbers, which the colour bar has too.
+    contours: QuadContourSet
+
+
+@house_style()
+def draw_value(axes: Axes, scene: Scene, value: FloatArray, **options: Unpack[CellOptions]) -> DrawnValue:
+    """Draw the soft value of every state: the expected reward on the way to the goal, with the entropy of the moves.
+
+    Colours span what is shown; lines join equal values, so that the likely moves cross them at right angles.
+
+    Args:
+        axes: Where to draw.
+        scene: The scene.
+        value: (n,) soft value V by state, nats; 0 at the goal.
+        options: As in :class:`CellOptions`.
+
+    Returns:
+        The artists.
+
+    Raises:
+        ValueError: There is not one number for each state.
+    """
+    check_states(scene, value)
+    window = options.get("window_m") or scene_window(scene, scene.nominal)
+    seen = value[shown_states(scene, window)]
+    colours = VALUE_MAP.with_extremes(bad=(0, 0, 0, 0))
+    image = draw_image(axes, scene, value, Normalize(seen.min(), seen.max()), colours)
+    rows, columns = scene.lattice.grid.shape
+    x = scene.lattice.grid.centres_of(np.stack([np.arange(columns), np.zeros(columns, dtype=int)], axis=1))[:, 0]
+    y = scene.lattice.grid.centres_of(np.stack([np.zeros(rows, dtype=int), np.arange(rows)], axis=1))[:, 1]
+    levels = MaxNLocator(_CONTOURS, steps=[1, 2, 5, 10]).tick_values(seen.min(), seen.max())
+    inner = levels[(levels > seen.min()) & (levels < seen.max())]
+    contours = axes.contour(x, y, table_of(scene, value), inner, colors=INK, linewidths=0.5, linestyles="-", zorder=0.5)
+    bar = draw_bar(axes, image, window, "soft value [nats]", extend="neither")
+    bar.add_lines(contours)
+    drawn = draw_scene(image, bar, scene, window, **options)
+    return DrawnValue(**vars(drawn), contours=contours)

@@ -1,0 +1,231 @@
+"""What stands on every map: scale bar, goals that are not shown, people beside their paths, paths over numbers."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from test_figures import demonstration, legend_texts, one_axes, room
+from test_figures_cells import PUBLISHED, scene, scene_and_visits
+from test_figures_rows import assert_nothing_touches
+
+from navirl_cli.demos.demonstration import Condition
+from navirl_cli.figures.cells import LIKELY_VISITS, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.conditions import draw_path_panels
+from navirl_cli.figures.ground import CROPPED_M, cropped_to, inside
+from navirl_cli.figures.overlay import Overlay, alike
+from navirl_cli.figures.paths import draw_paths
+from navirl_cli.figures.policies import draw_policy_and_reward
+from navirl_cli.figures.scale import length_m
+from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
+
+
+@pytest.mark.parametrize(
+    ("width_m", "expected"),
+    [(0.9, 0.1), (2.6, 1.0), (8.0, 1.0), (12.0, 1.0), (13.0, 2.0), (60.0, 10.0), (900.0, 100.0), (1.2, 0.2)],
+)
+def test_a_scale_bar_is_one_metre_or_a_round_number_that_fits(width_m, expected):
+    assert length_m(width_m) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
+def test_the_scale_bar_is_true_says_its_length_and_hides_no_path(width_in):
+    one = demonstration(aside_m=-1.2)
+    drawn = draw_paths(one_axes(width_in), [one])
+    trim_height(drawn.axes.figure)
+    bar = drawn.marks.scale_bar
+    (x0, y0), (x1, y1) = bar.get_xydata()
+    assert (x1 - x0, y1 - y0) == pytest.approx((1.0, 0.0))
+    (number,) = drawn.axes.texts
+    assert number.get_text() == "1 m"
+    drawn.axes.figure.draw_without_rendering()
+    number_box, map_box = number.get_window_extent(), drawn.axes.get_window_extent()
+    assert map_box.x0 < number_box.x0 < number_box.x1 < map_box.x1
+    assert map_box.y0 < number_box.y0 < number_box.y1 < map_box.y1
+    path = drawn.axes.transData.transform(one.xy_m)
+    assert not any(number_box.contains(x, y) for x, y in path)
+    assert np.abs(one.xy_m - bar.get_xydata().mean(axis=0)).max(axis=1).min() > 0.2
+    assert bar.get_label() not in legend_texts(drawn.axes)
+
+
+def test_the_scale_bar_takes_the_corner_that_is_free():
+    def corner(*ways_m):
+        ones = [replace(demonstration(), xy_m=np.repeat(way, [50, 51], 0)) for way in ways_m]
+        drawn = draw_paths(one_axes(), ones, window_m=room().extent_m)
+        x, y = drawn.marks.scale_bar.get_xydata().mean(axis=0)
+        return bool(x > 0), bool(y > 0)
+
+    south, north, west = [(-3.9, -1.8), (3.9, -1.8)], [(-3.9, 1.8), (3.9, 1.8)], [(-3.7, -1.8), (-3.7, 1.9)]
+    assert corner(north) == (True, False)
+    assert corner(south) == (True, True)
+    assert corner([(3.7, -1.8), (3.7, 1.9)]) == (False, False)
+    assert corner(south, [(3.7, -1.8), (3.7, 1.9)]) == (False, True)
+    assert corner(south, west) == (True, True)
+
+
+def test_a_goal_beyond_the_map_is_an_arrow_at_its_border():
+    far = replace(demonstration(), goal_m=(50.0, 30.0))
+    drawn = draw_paths(one_axes(), [demonstration(), far])
+    assert drawn.marks.goals.get_xydata().tolist() == [[3.0, 0.05]]
+    (arrow,) = drawn.marks.beyond
+    x, y = arrow.get_xydata()[0]
+    x0, x1, y0, y1 = room().extent_m
+    assert x0 < x < x1
+    assert y0 < y < y1
+    assert (x1 - x, y1 - y) == pytest.approx((0.16, 0.16))
+    tip, *tail, _ = arrow.get_marker()
+    assert tip == pytest.approx(np.array([50.0 - x, 30.0 - y]) / np.hypot(50.0 - x, 30.0 - y))
+    assert np.mean(tail, axis=0) == pytest.approx(-tip)
+    assert {"goal", "goal beyond"} < set(legend_texts(drawn.axes))
+
+
+def test_a_goal_that_is_not_shown_is_not_in_the_legend():
+    texts = legend_texts(draw_paths(one_axes(), [replace(demonstration(), goal_m=(50.0, 0.0))]).axes)
+    assert "goal beyond" in texts
+    assert "goal" not in texts
+    assert "goal beyond" not in legend_texts(draw_paths(one_axes(), [demonstration()]).axes)
+
+
+def test_people_at_different_places_have_the_line_of_their_paths():
+    ones = [demonstration(aside_m=aside, people_m=[(x, 0.1)]) for aside, x in ((0.5, 0.0), (0.4, 1.0), (0.3, 0.0))]
+    drawn = draw_paths(one_axes(), ones)
+    kinds = [line._dash_pattern for line in drawn.lines]
+    assert kinds[0] == kinds[2] != kinds[1]
+    first, second = drawn.people
+    assert [one.center[0] for one in (first, second)] == [0.0, 1.0]
+    assert first.get_linestyle() != second.get_linestyle()
+    assert drawn.lines[0].get_linestyle() == "-"
+    assert "person (line as path's)" in legend_texts(drawn.axes)
+
+
+def test_who_stands_beside_all_paths_has_a_plain_line_and_so_have_paths_with_nobody():
+    both = demonstration(people_m=[(0.0, 0.1), (1.0, -1.0)])
+    drawn = draw_paths(one_axes(), [both, demonstration(people_m=[(0.0, 0.1)]), demonstration(people_m=[])])
+    assert [line.is_dashed() for line in drawn.lines] == [False, True, False]
+    assert [one.get_linestyle() in {"-", "solid"} for one in drawn.people] == [True, True]
+
+
+def test_one_place_or_too_many_places_leave_lines_plain():
+    for places in ([0.0, 0.001], [0.0, 0.5, 1.0, 1.5, 2.0]):
+        drawn = draw_paths(one_axes(), [demonstration(people_m=[(x, 0.1)]) for x in places])
+        assert not any(line.is_dashed() for line in drawn.lines)
+        label = "person" if len(drawn.people) == 1 else "person (5 places)"
+        assert label in legend_texts(drawn.axes)
+
+
+def test_a_person_who_is_not_shown_is_not_in_the_legend():
+    axes = draw_paths(one_axes(), [demonstration(people_m=[(-3.0, 1.5)])], window_m=(-1.0, 1.0, -1.0, 1.0)).axes
+    assert "person" not in legend_texts(axes)
+
+
+def test_a_cropped_map_ends_beyond_paths_and_the_people_near_them():
+    near, far = (0.0, 1.5), (30.0, 30.0)
+    grid = room(800, 800, (-40.0, -40.0))
+    one = demonstration(grid=grid, people_m=[near, far], aside_m=0.0)
+    drawn = draw_paths(one_axes(), [one], crop=True)
+    low, high = one.xy_m.min(axis=0), one.xy_m.max(axis=0)
+    margin = CROPPED_M
+    expected = (low[0] - margin, high[0] + margin, low[1] - margin, 1.5 + 0.25 + 0.1)
+    assert (*drawn.axes.get_xlim(), *drawn.axes.get_ylim()) == pytest.approx(expected)
+    assert "person" in legend_texts(drawn.axes)  # the near one alone
+
+
+def test_a_crop_ends_with_the_map_even_where_the_map_is_small():
+    assert cropped_to([room()], np.array([(-3.9, 0.0), (3.0, 0.1)]), np.empty((0, 2))) == pytest.approx(
+        (-4.0, 3.5, -0.5, 0.6)
+    )
+
+
+def test_a_scene_is_cropped_to_where_its_policy_leads_and_to_paths_over_it():
+    a_scene, visits = scene_and_visits()
+    window = likely_window(a_scene, visits)
+    likely = a_scene.lattice.xy_m[visits >= LIKELY_VISITS]
+    assert inside(window, likely).all()
+    assert window[3] - window[2] < 3.0  # the room is 4 m high
+    line = np.array([(0.0, 0.0), (0.0, -1.9)])
+    assert likely_window(a_scene, visits, [line])[2] == pytest.approx(-2.0)
+
+
+def overlays():
+    lines = [demonstration(aside_m=aside).xy_m for aside in (0.5, 0.7)]
+    return [Overlay("force", "force", lines), Overlay("drawn from the policy", "learnt", lines * 6)]
+
+
+@pytest.mark.parametrize("draw", ["policy", "reward"])
+def test_paths_lie_thin_over_the_numbers_in_the_colour_of_their_group(draw):
+    a_scene, visits = scene_and_visits()
+    axes, paths = one_axes(), overlays()
+    if draw == "policy":
+        drawn = draw_policy(axes, a_scene, visits, overlays=paths)
+    else:
+        drawn = draw_reward(axes, a_scene, PUBLISHED.by_cell(a_scene), overlays=paths)
+    expected = [line for kind in paths for line in kind.lines_m]
+    for line, way in zip(drawn.overlays, expected, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), way)
+    assert [line.get_color() for line in drawn.overlays] == [COLOURS["force"]] * 2 + [COLOURS["learnt"]] * 12
+    assert drawn.obstacles.get_zorder() < drawn.nominal.get_zorder() < drawn.overlays[0].get_zorder()
+    assert drawn.overlays[0].get_zorder() < drawn.people[0].get_zorder()
+    assert max(line.get_linewidth() for line in drawn.overlays) < drawn.nominal.get_linewidth()
+    assert drawn.overlays[-1].get_alpha() < drawn.overlays[0].get_alpha()  # many let through what is below
+    assert legend_texts(axes)[:2] == ["force (n = 2)", "drawn from the policy (n = 12)"]
+
+
+def test_nothing_touches_on_a_map_with_everything():
+    a_scene, visits = scene_and_visits()
+    drawn = draw_policy(one_axes(), a_scene, visits, overlays=overlays(), robot_radius_m=0.3, title="policy")
+    trim_height(drawn.axes.figure)
+    assert_nothing_touches(drawn.axes.figure)
+
+
+def test_demonstrations_of_a_scene_have_its_map_people_start_and_goal():
+    one = demonstration()
+    same = demonstration(Condition.JOYSTICK, aside_m=0.4)
+    others = [
+        demonstration(people_m=[(0.0, 0.5)]),
+        demonstration(people_m=[]),
+        demonstration(people_m=[(0.0, 0.1), (2.0, 1.0)]),
+        demonstration(grid=room(origin_m=(-4.0, -1.9))),
+        replace(one, xy_m=one.xy_m + np.array([0.0, 0.26])),
+        replace(one, xy_m=one.xy_m * np.where(np.arange(101) == 100, 0.8, 1.0)[:, None]),
+    ]
+    assert alike([one, same, *others], one) == [one, same]
+    for other, another in combinations(others, 2):
+        assert alike([another], other) in ([], [another])
+    assert alike([one], others[2]) == []  # as many people as places is not enough
+    nobody = demonstration(people_m=[])
+    assert alike([nobody], nobody) == [nobody]
+    assert scene() is not None
+
+
+def test_a_kind_of_line_means_one_place_in_all_panels():
+    here, there = (demonstration(people_m=[(x, 0.1)]) for x in (0.0, 1.0))
+    _, axes = new_figure(PAGE_IN, panels=2)
+    drawn = draw_path_panels(axes, [("both", [here, there]), ("there", [there])])
+    assert [[line.is_dashed() for line in panel.lines] for panel in drawn.panels] == [[False, True], [True]]
+
+
+def test_panels_can_be_cropped_to_the_paths_of_all():
+    up, down = demonstration(aside_m=0.8), demonstration(aside_m=-0.8)
+    windows = [
+        draw_path_panels(new_figure(PAGE_IN, panels=2)[1], [("up", [up]), ("down", [down])], crop=crop).window_m
+        for crop in (False, True)
+    ]
+    low, high = down.xy_m[:, 1].min() - CROPPED_M, up.xy_m[:, 1].max() + CROPPED_M
+    assert windows[0] == pytest.approx(room().extent_m)
+    assert windows[1] == pytest.approx((-3.5, 3.5, low, high))
+
+
+def test_one_scene_under_two_rewards_has_one_window_and_one_scale_of_colours():
+    a_scene, visits = scene_and_visits()
+    _, axes = new_figure(PAGE_IN, panels=4, columns=2)
+    rows = [(name, a_scene, times * visits, times * PUBLISHED.by_cell(a_scene)) for name, times in (("a", 1), ("b", 2))]
+    window = (-3.5, 3.5, -1.0, 1.5)
+    drawn = draw_policy_and_reward(axes, rows, 0.3, window)
+    assert {one.window_m for one in (*drawn.policies, *drawn.rewards)} == {window}
+    assert {(*panel.get_xlim(), *panel.get_ylim()) for panel in axes} == {window}
+    for kind in (drawn.policies, drawn.rewards):
+        assert kind[0].image.get_clim() == kind[1].image.get_clim()
+        assert kind[0].colour_bar is kind[1].colour_bar
+    least = [one.image.get_array().min() for one in drawn.rewards]
+    assert drawn.rewards[0].image.get_clim()[0] < least[0] / 1.5

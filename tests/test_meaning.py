@@ -1,0 +1,77 @@
+"""What parameters mean in metres: closed forms, and intervals that follow the covariance."""
+
+from math import exp, log, sqrt
+
+import numpy as np
+import pytest
+
+from navirl_cli.evaluation.meaning import (
+    accepted_detour_m,
+    beside_detour_m,
+    half_distance_m,
+    longer_way_odds,
+    meanings,
+    passing_penalty,
+    tenth_distance_m,
+)
+from navirl_cli.irl.reward import Reward
+
+THETA = {"c0": -54.0, "a_g": -0.9, "a_p": -4.9, "sigma_p": 1.7}
+REWARD = Reward(tuple(THETA.values()))
+
+
+def test_half_and_tenth_of_personal_space():
+    for distance, share in ((half_distance_m(THETA), 0.5), (tenth_distance_m(THETA), 0.1)):
+        assert exp(-THETA["sigma_p"] * distance**2) == pytest.approx(share)
+
+
+def test_the_penalty_of_passing_is_the_sum_over_the_steps():
+    for distance in (0.3, 0.8):
+        x = np.arange(-400, 400) * 0.1 + 0.03
+        steps = THETA["a_p"] * np.exp(-THETA["sigma_p"] * (x**2 + distance**2))
+        assert passing_penalty(THETA, distance, 0.1) == pytest.approx(steps.sum(), rel=1e-6)
+
+
+def test_an_accepted_detour_costs_what_the_distance_gains():
+    detour = accepted_detour_m(THETA, 0.7, 0.1)
+    gain = passing_penalty(THETA, 0.8, 0.1) - passing_penalty(THETA, 0.7, 0.1)
+    assert -THETA["c0"] * detour == pytest.approx(gain)
+    assert detour > 0
+    # A person who attracts buys no distance.
+    assert accepted_detour_m({**THETA, "a_p": 2.0}, 0.7, 0.1) < 0
+
+
+def test_longer_ways_and_ways_beside_the_path():
+    assert longer_way_odds(THETA) == pytest.approx(exp(-5.4))
+    # Ten steps of 10 cm at half a metre cost 10 a_g / 4.
+    assert -THETA["c0"] * beside_detour_m(THETA, 0.1) == pytest.approx(10 * 0.9 * 0.25)
+
+
+def test_intervals_follow_the_covariance():
+    error = 0.2
+    covariance = np.full((4, 4), np.nan)
+    covariance[3, 3] = error**2
+    found = {one.text.split(" at")[0]: one for one in meanings(REWARD, covariance, 0.1, 0.7, np.random.default_rng(0))}
+    half = next(one for text, one in found.items() if "half" in text)
+    # Half distance falls with sigma_p: the interval's ends are those of sigma_p, swapped.
+    assert half.lower == pytest.approx(sqrt(log(2) / (1.7 + 1.96 * error)), rel=0.02)
+    assert half.upper == pytest.approx(sqrt(log(2) / (1.7 - 1.96 * error)), rel=0.02)
+    without = [one for text, one in found.items() if "personal-space" not in text and "tenth" not in text]
+    assert len(without) >= 2
+    tenth = next(one for text, one in found.items() if "tenth" in text)
+    assert tenth.lower / half.lower == pytest.approx(sqrt(log(10) / log(2)), rel=1e-6)
+    odds = next(one for text, one in found.items() if "longer" in text)
+    assert np.isnan([odds.lower, odds.upper]).all()
+
+
+def test_the_same_seed_gives_the_same_intervals_and_nobody_passed_no_detour():
+    covariance = np.diag([9.0, 0.04, 0.5, 0.04])
+    one, two = (meanings(REWARD, covariance, 0.1, 0.7, np.random.default_rng(3)) for _ in range(2))
+    assert one == two
+    assert len(meanings(REWARD, covariance, 0.1, float("nan"), np.random.default_rng(3))) == len(one) - 1
+
+
+def test_draws_beyond_the_bounds_are_held_at_them():
+    wild = np.diag([9.0, 0.04, 0.5, 100.0])
+    for one in meanings(REWARD, wild, 0.1, 0.7, np.random.default_rng(1)):
+        assert np.isfinite([one.lower, one.upper]).all()

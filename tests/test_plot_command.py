@@ -1,0 +1,195 @@
+"""``navirl plot`` as it is called: options of every figure, and refusals in one line."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from test_figures import demonstration
+
+from navirl_cli.artefacts.demonstrations import demonstrations_document
+from navirl_cli.artefacts.rewards import reward_document
+from navirl_cli.artefacts.store import write_json
+from navirl_cli.demos.demonstration import Condition
+from navirl_cli.figures import sheet
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.reward import Reward
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Demonstrations of one scene and what was learnt from them; few cells, for speed."""
+    folder = tmp_path_factory.mktemp("plot")
+    ones = [
+        replace(demonstration(Condition.FORCE, 1, 0.5, contacts=[(2.0, 4.0)]), id="p01/1"),
+        replace(demonstration(Condition.JOYSTICK, None, -0.5, people_m=[(0.0, 0.6)]), id="p01/2"),
+    ]
+    write_json(folder / "demos.json", "demonstrations", demonstrations_document(ones, [], {}), force=False)
+    found = fit(evidence_of(ones), Reward.named({}), restarts=False)
+    document = reward_document(found, ones, [], 0.1)
+    for parameter, value in zip(document["parameters"], (-20.0, -0.9, -4.9, 1.7), strict=True):
+        parameter["value"] = value  # two paths alike would make a policy that knows but one
+    write_json(folder / "reward.json", "reward", document, force=False)
+    return folder
+
+
+@pytest.fixture
+def figure_of(navirl, monkeypatch):
+    """Run ``navirl plot`` and give the figure in place of drawing its file."""
+
+    def run(*words):
+        saved = []
+        monkeypatch.setattr(sheet, "save_figure", lambda figure, *_, **__: saved.append(figure))
+        assert navirl("plot", *words, "-o", "a.png").stdout == "a.png\n"
+        return saved[0]
+
+    return run
+
+
+def entries(figure):
+    """Texts of all legends."""
+    legends = [panel.get_legend() for panel in figure.axes if panel.get_legend()] + figure.legends
+    return [text.get_text() for legend in legends for text in legend.get_texts()]
+
+
+def test_a_figure_for_a_screen_has_twice_the_pixels_in_the_dark(navirl, files):
+    navirl("plot", "paths", files / "demos.json", "--style", "dark", "-o", "a.png")
+    with Image.open("a.png") as image:
+        assert image.size[0] == 2100
+        assert image.getpixel((0, 0))[:3] == (20, 20, 20)
+
+
+def test_a_figure_for_a_page_is_a_page_wide_with_outlines_of_letters(navirl, files):
+    navirl("plot", "paths", files / "demos.json", "--wide", "--crop", "-o", "a.pdf")
+    page = Path("a.pdf").read_bytes()
+    assert b"/Type3" not in page
+    assert b"/MediaBox [ 0 0 515.52 " in page  # 7.16 in
+
+
+def test_every_map_can_be_cropped_and_shows_the_same(files, figure_of):
+    learnt = (files / "demos.json", "--reward", files / "reward.json")
+    windows = {}
+    for kind in ("policy", "reward", "value", "actions"):
+        axes = figure_of(kind, *learnt, "--crop", "--overlay", "demos").axes[0]
+        windows[kind] = (*axes.get_xlim(), *axes.get_ylim())
+        assert "force, cycle 1 (n = 1)" in entries(axes.figure)
+    assert len(set(windows.values())) == 1
+    whole = figure_of("policy", *learnt).axes[0]
+    assert np.ptp(whole.get_ylim()) > np.ptp(windows["policy"][2:])
+    assert figure_of("paths", files / "demos.json", "--wide").get_size_inches()[0] == 7.16
+
+
+def test_paths_over_a_map_are_those_of_its_scene_and_repeat_with_the_seed(files, figure_of):
+    words = ("policy", files / "demos.json", "--reward", files / "reward.json")
+    both = ("--overlay", "demos", "--overlay", "samples", "--samples", "7")
+    ways = []
+    for seed in (1, 1, 2):
+        figure = figure_of(*words, *both, "--seed", seed)
+        shown = entries(figure)
+        assert shown[:2] == ["force, cycle 1 (n = 1)", "drawn from the policy (n = 7)"]  # the other has another scene
+        drawn = [line for line in figure.axes[0].lines if line.get_color() == "#CC79A7"]
+        ways.append([line.get_xydata().tolist() for line in drawn])
+        assert len(ways[-1]) == 7
+    assert ways[0] == ways[1] != ways[2]
+
+
+def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
+    for words, message in (
+        (("paths", "none.json", "-o", "a.gif"), "a.gif: a figure is saved as .png, .pdf or .svg"),
+        (("policy", "none.json", "--reward", "none.json", "-o", "no/a.png"), "no/a.png: expected an existing folder"),
+    ):
+        assert message in navirl("plot", *words, code=1).stderr
+    assert (
+        "'paper', 'screen', 'dark'"
+        in navirl("plot", "paths", files / "demos.json", "-o", "a.png", "--style", "loud", code=2).stderr
+    )
+    assert list(tmp_path.iterdir()) == []
+    assert json.loads((files / "reward.json").read_text())["format"] == "navirl/reward"
+
+
+def test_the_styles_offered_are_those_that_there_are():
+    from navirl_cli.commands.plot_page import STYLES
+    from navirl_cli.figures.style import LOOKS
+
+    assert list(STYLES) == list(LOOKS)
+
+
+@pytest.mark.parametrize(("kind", "label"), [("value", "soft value [nats]"), ("actions", "most likely move")])
+def test_values_and_moves_are_drawn_of_the_trial_that_was_asked_for(files, figure_of, kind, label):
+    words = (kind, files / "demos.json", "--reward", files / "reward.json", "--trial", "p01/2")
+    (map_axes,) = figure_of(*words, "--overlay", "demos").axes
+    assert "joystick (n = 1)" in entries(map_axes.figure)
+    (bar,) = map_axes.child_axes
+    assert label in (bar.get_ylabel() + bar.get_xlabel()).replace("\n", " ")
+
+
+def test_forces_are_drawn_of_a_trial_that_has_some_and_others_are_refused(navirl, files, figure_of):
+    document = json.loads((files / "demos.json").read_text())
+    count = len(document["demonstrations"][0]["t_s"])
+    document["demonstrations"][0] |= {"force_x_n": [0.0] * count, "force_y_n": [9.0] * count}
+    Path("forced.json").write_text(json.dumps(document))
+    assert figure_of("forces", "forced.json").axes[0].get_title() == "p01/1: force, cycle 1"
+    message = navirl("plot", "forces", "forced.json", "--trial", "p01/2", "-o", "b.png", code=1).stderr
+    assert "demonstration p01/2: no forces to draw, for its log holds no wrench; choose another with --trial" in message
+
+
+def test_convergence_is_drawn_of_the_path_that_the_file_keeps(files, figure_of):
+    kept = json.loads((files / "reward.json").read_text())["search"]
+    assert len(kept["log_likelihood"]) == len(kept["theta"]) > 1
+    figure = figure_of("convergence", files / "reward.json")
+    drawn = [panel.lines[0].get_ydata().tolist() for panel in figure.axes]
+    assert drawn == [kept["log_likelihood"], *map(list, zip(*kept["theta"], strict=True))]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda content: content.pop("search"),
+            "holds no iterations, as files of older versions; fit anew with navirl",
+        ),
+        (lambda content: content["search"]["theta"].pop(), "search/theta: expected"),
+        (lambda content: content["search"]["theta"][0].pop(), "rows of 4 numbers, as search/log_likelihood"),
+        (lambda content: content["search"].pop("theta"), "breaks the schema of navirl reward at search"),
+        (lambda content: content["search"].update(log_likelihood=[]), "breaks the schema of navirl reward at search"),
+    ],
+)
+def test_a_file_without_a_sound_path_is_refused(navirl, files, change, message):
+    content = json.loads((files / "reward.json").read_text())
+    change(content)
+    Path("reward.json").write_text(json.dumps(content))
+    assert message in navirl("plot", "convergence", "reward.json", "-o", "a.png", code=1).stderr
+
+
+def test_ranks_are_those_of_the_groups_that_were_asked_for(navirl, files, figure_of):
+    words = ("ranks", files / "demos.json", "--reward", files / "reward.json", "--samples", "50")
+    assert figure_of(*words).axes[0].get_title().startswith("n = 2, p ")
+    assert figure_of(*words, "--group", "joystick").axes[0].get_title().startswith("n = 1, p ")
+    message = navirl("plot", *words, "--group", "joystik", "-o", "c.svg", code=1).stderr
+    assert "no group is called 'joystik'; there are 'force, cycle 1', 'joystick'" in message
+
+
+def test_two_rewards_or_two_groups_stand_beside_each_other(files, figure_of):
+    words, one = ("compare", files / "demos.json"), ("--reward", files / "reward.json")
+    Path("other.json").write_text((files / "reward.json").read_text())
+    figure = figure_of(*words, *one, "--reward", "other.json", "--trial", "p01/2", "--crop")
+    assert [panel.get_title(loc="left") for panel in figure.axes[:4]] == ["reward", "", "other", ""]
+    assert len({(*panel.get_xlim(), *panel.get_ylim()) for panel in figure.axes[:4]}) == 1
+    figure = figure_of(*words, *one, *one)  # names that tell nothing are told with their folders
+    assert figure.axes[0].get_title(loc="left").replace("\n", "") == str(files / "reward.json")
+    figure = figure_of(*words, "--group", "joystick", "--group", "force, cycle 1")
+    titles = [" ".join(panel.get_title().split()) for panel in figure.axes]
+    assert titles == ["joystick (n = 1)", "force, cycle 1 (n = 1)"]
+
+
+def test_what_cannot_be_compared_is_refused(navirl, files):
+    words, one = ("plot", "compare", files / "demos.json", "-o", "c.png"), ("--reward", files / "reward.json")
+    needs = "compare needs two or more --reward, or two or more --group"
+    for wrong in ((), one, ("--group", "joystick"), (*one, *one, "--group", "joystick")):
+        assert needs in navirl(*words, *wrong, code=2).stderr
+    both = ("--group", "joystick", "--group", "force, cycle 1", "--trial", "p01/1")
+    assert "--trial chooses the scene of --reward" in navirl(*words, *both, code=2).stderr
+    assert "no group is called 'x'" in navirl(*words, "--group", "x", "--group", "y", code=1).stderr

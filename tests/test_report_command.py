@@ -1,0 +1,66 @@
+"""``navirl report``: one page that says what the files say."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.cli import cli
+from navirl_cli.evaluation.meaning import half_distance_m
+
+LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    for words in (
+        ["extract", *LOGS, "-o", folder / "demos.json"],
+        ["fit", folder / "demos.json", "--cycle", 2, "--profile", "c0", "-o", folder / "reward.json"],
+        ["report", folder / "demos.json", folder / "reward.json", "-o", folder / "page.html", "--samples", 100],
+    ):
+        result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(work):
+    return (work / "page.html").read_text()
+
+
+def test_it_tells_parameters_and_what_they_mean(work, page):
+    document = json.loads((work / "reward.json").read_text())
+    for one in document["parameters"]:
+        low, high = (one["value"] + sign * 1.96 * one["standard_error"] for sign in (-1, 1))
+        assert f"{one['value']:.4g}" in page
+        assert f"{low:.4g} to {high:.4g}" in page
+    theta = dict(zip(("c0", "a_g", "a_p", "sigma_p"), read_reward(work / "reward.json").reward.theta, strict=True))
+    assert f"<strong>{half_distance_m(theta):.3g} m</strong>" in page
+    assert "7 demonstrations of 1 participant, and a navigation reward learnt from 2 of 1 participant." in page
+
+
+def test_it_holds_figures_trials_ranks_and_hashes(work, page):
+    assert page.count("data:image/png;base64,") == 4  # paths, policy, properties, profile
+    for number in range(1, 8):
+        assert f"p01/{number}" in page
+    document = json.loads((work / "demos.json").read_text())
+    assert document["inputs"][0]["sha256"] in page.replace("<wbr>", "")
+    assert re.search(r"Kolmogorov-Smirnov D = 0\.\d{3}, p = ", page)
+    assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
+
+
+def test_it_warns_of_what_rests_on_little(page):
+    assert "Errors by participant are rough below ten participants." in page
+    assert "rests on little: its standard error exceeds half of its value." in page
+
+
+def test_refusals(navirl, work):
+    words = ("report", work / "demos.json", work / "reward.json")
+    assert "expected a name that ends in .html, found '.pdf'" in navirl(*words, "-o", "page.pdf", code=1).stderr
+    assert "exists already" in navirl(*words, "-o", work / "page.html", code=1).stderr
+    swapped = navirl("report", work / "reward.json", work / "demos.json", "-o", "x.html", code=1).stderr
+    assert "expected navirl demonstrations" in swapped
