@@ -6,6 +6,7 @@ import factories as make
 import numpy as np
 import oracles
 import pytest
+from scipy import stats
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.evaluation.compare import (
@@ -218,3 +219,16 @@ def test_progress_counts_demonstrations():
     seen = []
     run(progress=lambda done, of_all: seen.append((done, of_all)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_intervals_of_means_count_participants_not_trials():
+    trials = [
+        trial(STRAIGHT, 1), trial(ROUND, 2), trial(ROUND, 1, participant="p2"), trial(ROUND, 2, participant="p2"),
+        trial(STRAIGHT, 1, participant="p3"),
+    ]  # fmt: skip
+    group = of(run(trials), "force, cycle 2", DRIVEN)
+    straight, around = (oracles.length_by_steps(GRID.centres_of(cells)) for cells in (STRAIGHT, ROUND))
+    means = [(straight + around) / 2, around, straight]
+    low, high = stats.t.interval(0.95, 2, np.mean(means), stats.sem(means))
+    assert group.half_interval["length_m"] == pytest.approx((high - low) / 2)
+    assert np.isnan(of(run(trials[:2]), "force, cycle 2", DRIVEN).half_interval["length_m"])

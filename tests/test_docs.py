@@ -8,6 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from navirl_cli.cli import COMMANDS, cli
+from navirl_cli.commands.evaluate_report import METRICS_HEADER, metric_rows
+from navirl_cli.commands.formats import Format, formatted
 from navirl_cli.commands.plot import plot
 from navirl_cli.logs.topics import ROLES
 
@@ -79,3 +81,8 @@ def test_architecture_names_the_files_that_stand():
     ):
         whole = ROOT / "navirl_cli" / path
         assert whole.is_dir() or whole.with_suffix(".py").exists(), path
+
+
+def test_the_page_of_metrics_is_that_of_the_command():
+    text = (ROOT / "METRICS.md").read_text()
+    assert formatted(METRICS_HEADER, metric_rows(), Format.MARKDOWN) in text

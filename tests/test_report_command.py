@@ -2,10 +2,12 @@
 
 import json
 import re
+from base64 import b64decode
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from test_reports_page import CHROMIUM, Browser
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
@@ -56,6 +58,28 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
 def test_it_warns_of_what_rests_on_little(page):
     assert "Errors by participant are rough below ten participants." in page
     assert "rests on little: its standard error exceeds half of its value." in page
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found; on Debian: apt-get install chromium")
+def test_it_opens_sorts_enlarges_and_prints(work):
+    browser = Browser(work / "profile")
+    try:
+        browser.show(width=360, height=700)
+        browser.open(work / "page.html")
+        assert browser.run("document.documentElement.scrollWidth <= innerWidth"), "the page scrolls sideways"
+        assert not [
+            event for event in browser.events if event["method"] in {"Log.entryAdded", "Runtime.exceptionThrown"}
+        ]
+        ranks = "[...document.querySelectorAll('table')].find(one => one.innerText.includes('log-likelihood'))"
+        column = f"[...{ranks}.tBodies[0].rows].map(row => Number(row.cells[3].innerText))"
+        browser.run(f"{ranks}.querySelectorAll('th button')[3].click()")
+        sorted_ranks = browser.run(column)
+        assert sorted_ranks == sorted(sorted_ranks)
+        browser.run("document.querySelector('figure img').click()")
+        assert browser.run("document.querySelector('dialog').open")
+        assert b64decode(browser.call("Page.printToPDF")["data"]).startswith(b"%PDF")
+    finally:
+        browser.close()
 
 
 def test_refusals(navirl, work):

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from navirl_cli.artefacts.store import Input, number
 from navirl_cli.commands.formats import Format, formatted
 from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison, GroupMetrics
@@ -39,6 +41,14 @@ def tables(result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Seq
         return _groups_csv(result, metrics)
     wide = len(metrics) <= MOST_COLUMNS
     parts = [formatted(*_groups(result, metrics), how)] if wide else _by_metric(result, metrics, how)
+    driven = [
+        row for row in result.groups if row.kind == DRIVEN and np.isfinite(list(row.half_interval.values())).any()
+    ]
+    if driven and wide:
+        parts += [
+            "95 % intervals of the means of driven paths, over participants",
+            formatted(*_intervals(driven, metrics), how),
+        ]
     for one, other, found in pairs:
         parts += [f"{one} less {other}, driven paths, paired by participant", formatted(*_paired(found, metrics), how)]
     if ranks:
@@ -82,16 +92,26 @@ def _mean_and_spread(row: GroupMetrics, name: str) -> str:
     return f"{mean:.3f}" + (f" ± {spread:.3f}" if isfinite(spread) else "")
 
 
+def _intervals(driven: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> tuple[list[str], list[list[str]]]:
+    """From where to where the mean of each group lies."""
+    rows = []
+    for row in driven:
+        edges = [(row.mean.get(m.name, np.nan), row.half_interval.get(m.name, np.nan)) for m in metrics]
+        cells = [f"{mean - half:.3f} to {mean + half:.3f}" if isfinite(half) else "-" for mean, half in edges]
+        rows.append([row.group, *cells])
+    return ["group", *(metric.heading for metric in metrics)], rows
+
+
 def _groups_csv(result: Comparison, metrics: Sequence[Metric]) -> str:
     """The same with a column for each number."""
-    parts = ("mean", "std", "error", "exact")
+    parts = ("mean", "std", "half_interval", "error", "exact")
     header = ["group", "paths", "n", *(f"{metric.name}_{part}" for metric in metrics for part in parts)]
     rows = []
     for row in result.groups:
         numbers = [
             values.get(metric.name, float("nan"))
             for metric in metrics
-            for values in (row.mean, row.std, row.error, row.exact)
+            for values in (row.mean, row.std, row.half_interval, row.error, row.exact)
         ]
         rows.append([row.group, row.kind, str(row.count), *(f"{n:.6g}" if isfinite(n) else "" for n in numbers)])
     return formatted(header, rows, Format.CSV)
@@ -168,7 +188,11 @@ def document(
                 "count": row.count,
                 "mean": _chosen(row.mean, names),
                 "standard_deviation": _chosen(row.std, names),
-                **({"error": _chosen(row.error, names), "exact": _chosen(row.exact, names)} if row.error else {}),
+                **(
+                    {"error": _chosen(row.error, names), "exact": _chosen(row.exact, names)}
+                    if row.error
+                    else {"half_interval": _chosen(row.half_interval, names)}
+                ),
             }
             for row in result.groups
         ],

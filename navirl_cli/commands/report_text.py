@@ -96,6 +96,7 @@ def report_of(
             ),
             "Share of the policy's paths that are less likely.",
         ),
+        *_held_out(document),
         Heading("What the logs held"),
         _trials(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
@@ -138,6 +139,21 @@ def _sentence(one: Meaning) -> str:
     """A meaning with its interval."""
     interval = f" ({one.lower:.3g} to {one.upper:.3g})" if isfinite(one.lower) else ""
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
+
+
+def _held_out(document: Mapping[str, Any]) -> list[Block]:
+    """How well each participant is foretold from the others, where that was asked for."""
+    found = document["cross_validation"]
+    if found is None:
+        return [
+            Paragraph("How well it foretells people that it has not seen: fit with `--cross-validate participant`.")
+        ]
+    rows = tuple(
+        (model, *("-" if value is None else f"{value:.3f}" for value in (one["per_step"], *one["log_likelihood"])))
+        for model, one in found["models"].items()
+    )
+    header = ("model", "per step", *found["left_out"])
+    return [Table(header, rows, "Log-likelihood of each participant under a fit of the others, nats.")]
 
 
 def _warnings(learnt: LearntReward, document: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:

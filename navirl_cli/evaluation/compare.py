@@ -1,7 +1,7 @@
 """Demonstrated paths against learnt ones and against paths that know nothing of people's wishes."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -51,6 +51,9 @@ class GroupMetrics:
     error: Values = field(default_factory=dict)
     #: Of learnt paths: exact expected values, where visits give them.
     exact: Values = field(default_factory=dict)
+    #: Of other paths: half the 95 % interval of the mean, participants counting with their own means (Student); NaN
+    #: for one participant.
+    half_interval: Values = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ def compare(
         SceneError: A demonstration's scene has no way.
         InfinitePartitionError: A reward has no policy in a scene.
     """
-    lines: dict[tuple[str, str], list[Values]] = {}
+    lines: dict[tuple[str, str], list[tuple[str, Values]]] = {}
     learnt: dict[tuple[str, str], list[tuple[Drawn, dict[str, FloatArray]]]] = {}
     known: dict[tuple[str, int, float], Drawn] = {}
     rows: list[Driven] = []
@@ -135,7 +138,7 @@ def compare(
             if kind == DRIVEN:
                 values = {**values, **motion_values(one), **contact_values(one)}
                 rows.append(Driven(one.id, one.participant, group, values))
-            lines.setdefault((group, kind), []).append(values)
+            lines.setdefault((group, kind), []).append((one.participant, values))
         for name, reward in rewards.items():
             key = (name, id(scene), one.robot_radius_m)
             if key not in known:
@@ -145,7 +148,7 @@ def compare(
             learnt.setdefault((group, kind), []).append((known[key], near))
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    groups = [summary_of(group, kind, values) for (group, kind), values in lines.items()]
+    groups = [_with_interval(summary_of(*key, [values for _, values in own]), own) for key, own in lines.items()]
     groups += [_learnt(group, kind, members) for (group, kind), members in learnt.items()]
     order = list(by_group(demonstrations, fields))
     groups.sort(key=lambda row: (order.index(row.group), _place(row.kind), row.kind))
@@ -183,6 +186,23 @@ def summary_of(group: str, kind: str, measured: Iterable[Values]) -> GroupMetric
             mean[metric.name] = float(values.mean()) if len(values) else float("nan")
             spread[metric.name] = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
     return GroupMetrics(group, kind, len(paths), mean, spread)
+
+
+def _with_interval(row: GroupMetrics, measured: Sequence[tuple[str, Values]]) -> GroupMetrics:
+    """A group with intervals of its means over participants; values come with whose they are."""
+    from scipy.stats import t
+
+    found = {}
+    for name in row.mean:
+        own: dict[str, list[float]] = {}
+        for participant, values in measured:
+            if np.isfinite(values[name]):
+                own.setdefault(participant, []).append(values[name])
+        means = np.array([np.mean(known) for known in own.values()])
+        several = len(means) > 1
+        half = t.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)) if several else np.nan
+        found[name] = float(half)
+    return replace(row, half_interval=found)
 
 
 def _learnt(group: str, kind: str, members: Sequence[tuple[Drawn, dict[str, FloatArray]]]) -> GroupMetrics:
