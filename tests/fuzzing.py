@@ -1,5 +1,6 @@
 """Many broken logs, one after the other, and what came of them."""
 
+import gc
 import resource
 import signal
 import sys
@@ -66,6 +67,7 @@ def judged(numbers: Iterable[int], seed: int = 0, keep: Path | None = None) -> T
     """
     tally = Tally()
     logs = list(sound_logs())
+    gc.collect()  # what others left must not be freed while memory is measured
     with tempfile.TemporaryDirectory() as folder:
         for number in numbers:
             broken = mutant(number, logs, seed)
