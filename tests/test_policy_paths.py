@@ -23,7 +23,7 @@ NOMINAL = SCENE.nominal_line_m()
 
 @pytest.fixture(scope="module")
 def drawn():
-    return sample_paths(POLICY, SCENE.start, 4000, np.random.default_rng(0))
+    return sample_paths(POLICY, SCENE.start, 10_000, np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")
