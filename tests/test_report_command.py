@@ -42,7 +42,7 @@ def test_it_tells_parameters_and_what_they_mean(work, page):
         assert f"{low:.4g} to {high:.4g}" in page
     theta = dict(zip(("c0", "a_g", "a_p", "sigma_p"), read_reward(work / "reward.json").reward.theta, strict=True))
     assert f"<strong>{half_distance_m(theta):.3g} m</strong>" in page
-    assert "7 demonstrations of 1 participant, and a navigation reward learnt from 2 of 1 participant." in page
+    assert "7 demonstrations of 1 participant, and a navigation reward learnt from 2 of them, of 1 participant." in page
 
 
 def test_it_holds_figures_trials_ranks_and_hashes(work, page):

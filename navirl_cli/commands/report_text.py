@@ -54,7 +54,7 @@ def report_of(
         seed: Of the intervals.
     """
     everyone = _people(len({one.participant for one in demonstrations}))
-    fit = f"learnt from {len(learnt.demonstrations)} of {_people(len(document['participants']))}"
+    fit = f"learnt from {len(learnt.demonstrations)} of them, of {_people(len(document['participants']))}"
     seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
     seen = [distance for distance in seen if isfinite(distance)]
     rng = np.random.default_rng(seed)
