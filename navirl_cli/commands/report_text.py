@@ -55,12 +55,6 @@ def report_of(
     """
     everyone = _people(len({one.participant for one in demonstrations}))
     fit = f"learnt from {len(learnt.demonstrations)} of them, of {_people(len(document['participants']))}"
-    seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
-    seen = [distance for distance in seen if isfinite(distance)]
-    rng = np.random.default_rng(seed)
-    said = meanings(
-        learnt.reward, learnt.covariance, learnt.resolution_m, float(np.mean(seen)) if seen else float("nan"), rng
-    )
     notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
     blocks: list[Block] = [
         Paragraph(f"{len(demonstrations)} demonstrations of {everyone}, and a navigation reward {fit}."),
@@ -73,7 +67,7 @@ def report_of(
             f"{learnt.status.advice}."
         ),
         Heading("What it means"),
-        Bullets(tuple(map(_sentence, said))),
+        Bullets(tuple(map(_sentence, _said(demonstrations, learnt, seed)))),
         *_warnings(learnt, document, ranks),
         Heading("Where it leads"),
         *_pictures(figures, "policy", "profile"),
@@ -82,20 +76,7 @@ def report_of(
         *_pictures(figures, "properties", "paths"),
         Heading("How typical the demonstrations are"),
         Paragraph(f"R{uniform_line(ranks)[1:]}. Those it was learnt from are counted too."),
-        Table(
-            ("demonstration", "group", "log-likelihood", "rank", "learnt from"),
-            tuple(
-                (
-                    one.id,
-                    one.group,
-                    f"{one.log_likelihood:.2f}",
-                    f"{one.rank:.3f}",
-                    "yes" if one.id in learnt.demonstrations else "no",
-                )
-                for one in ranks
-            ),
-            "Share of the policy's paths that are less likely.",
-        ),
+        _ranks(learnt, ranks),
         *_held_out(document),
         Heading("What the logs held"),
         _trials(demonstrations),
@@ -104,6 +85,30 @@ def report_of(
         Table(("file", "SHA-256"), tuple((one["file"], one["sha256"]) for one in made_from), "Files and their hashes."),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
+
+
+def _said(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:
+    """What the reward means where people were passed."""
+    seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
+    seen = [distance for distance in seen if isfinite(distance)]
+    passed = float(np.mean(seen)) if seen else float("nan")
+    return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, np.random.default_rng(seed))
+
+
+def _ranks(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
+    """Rank by demonstration."""
+    rows = [
+        (
+            one.id,
+            one.group,
+            f"{one.log_likelihood:.2f}",
+            f"{one.rank:.3f}",
+            "yes" if one.id in learnt.demonstrations else "no",
+        )
+        for one in ranks
+    ]
+    header = ("demonstration", "group", "log-likelihood", "rank", "learnt from")
+    return Table(header, tuple(rows), "Share of the policy's paths that are less likely.")
 
 
 def _people(count: int) -> str:
