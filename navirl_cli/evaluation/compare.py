@@ -160,12 +160,17 @@ def _place(kind: str) -> int:
     return list(KINDS).index(kind if kind in KINDS else LEARNT)
 
 
+def nominal_of(demonstration: Demonstration, scene: Scene) -> FloatArray:
+    """(k, 2) m: the line that the navigation followed, where the log says, else the scene's nominal path."""
+    return scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m
+
+
 def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict[str, FloatArray]:
     """The line of every kind but the learnt."""
     lines = {
         DRIVEN: demonstration.xy_m,
         ON_GRID: demonstration.grid.centres_of(demonstration.cells),
-        NOMINAL: scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m,
+        NOMINAL: nominal_of(demonstration, scene),
     }
     try:
         clearance = demonstration.robot_radius_m + PERSON_RADIUS_M

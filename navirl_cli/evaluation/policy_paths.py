@@ -1,6 +1,5 @@
 """Properties of a policy's paths: of drawn ones, all at once, and expected values where visits give them exactly."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,8 +113,3 @@ def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
         about_people = ("min_distance_m", "mean_distance_m", *(f"{name}_m" for name, _ in ZONES))
         found |= dict.fromkeys(about_people, np.full(len(length), np.nan))
     return found
-
-
-def standard_errors(values: Mapping[str, FloatArray]) -> dict[str, float]:
-    """Monte Carlo standard errors of the means of drawn paths' values; NaN where one is not known."""
-    return {name: float(own.std(ddof=1) / np.sqrt(len(own))) for name, own in values.items()}

@@ -7,7 +7,7 @@ import numpy as np
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import FloatArray
-from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, summary_of
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, nominal_of, summary_of
 from navirl_cli.evaluation.metrics import Values, paper_values
 from navirl_cli.irl.scene import Scene, scenes_of
 
@@ -39,11 +39,6 @@ def measured(demonstrations: Sequence[Demonstration]) -> list[Measured]:
         SceneError: A demonstration's scene has no way from start to goal.
     """
     return [_measured(one, scene) for one, scene in zip(demonstrations, scenes_of(demonstrations), strict=True)]
-
-
-def nominal_of(demonstration: Demonstration, scene: Scene) -> FloatArray:
-    """(k, 2) m: the line that the navigation followed, where the log says, else the scene's nominal path."""
-    return scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m
 
 
 def _measured(one: Demonstration, scene: Scene) -> Measured:
