@@ -160,7 +160,7 @@ def bound(path: Path, *, kept: bool = False) -> "Work":
 
 def navirl(path: Path) -> "Work":
     """Columns by navirl's reader."""
-    from navirl_cli.logs.reader import read
+    from navirl_cli.logs.messages.reader import read
 
     def work() -> "Columns":
         series = read(path, WANTS).series
@@ -171,7 +171,7 @@ def navirl(path: Path) -> "Work":
 
 def scanned(path: Path) -> "Work":
     """Contents without payloads by navirl's reader."""
-    from navirl_cli.logs.reader import scan
+    from navirl_cli.logs.messages.reader import scan
 
     return lambda: scan(path)
 

@@ -14,7 +14,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError
 
-from navirl_cli.logs.reader import Contents, Series
+from navirl_cli.logs.messages.reader import Contents, Series
 
 #: A message: time of receipt, and its columns' bytes.
 Row = tuple[int, tuple[bytes, ...]]

@@ -16,7 +16,7 @@ from log_factory import START_NS
 from mcap.writer import CompressionType, IndexType
 from strict_log import Told
 
-from navirl_cli.logs.reader import read
+from navirl_cli.logs.messages.reader import read
 
 WRENCHES, ODOMETRIES, IMAGES, SECONDS = 500, 50, 10, 60
 #: Noise: a chunk of a second takes two blocks of zstd.

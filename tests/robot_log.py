@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.logs.writer import LogWriter, header, message_type
+from navirl_cli.logs.messages.writer import LogWriter, header, message_type
 
 START_NS = 1_700_000_000_000_000_000
 #: The robot stands for 2 s, drives 4 m in 10 s along y = 0, and stands for 2 s; it is pushed from 5 s to 7 s.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import log_factory as forge
 import pytest
 
-from navirl_cli.logs.reader import read
+from navirl_cli.logs.messages.reader import read
 
 WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x")
 WRENCH_PAYLOAD = forge.cdr(forge.wrench(0, (1, 2, 3)))

@@ -10,8 +10,8 @@ import nav_log as nav
 import numpy as np
 import pytest
 
-from navirl_cli.logs.clocks import Clock, Stamped, TimeSource, in_order
 from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order
 
 OTHER = "run.mcap: /wrench is stamped by another clock than /odom: "
 WILD = "run.mcap: 1 messages on {topic} have stamps more than 1 s off their clock; the time of their receipt stands in"

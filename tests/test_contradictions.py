@@ -6,10 +6,10 @@ import struct
 import log_factory as forge
 import pytest
 import strict_log
-from test_container import FIELDS, damaged, wrenches_before
+from test_log_file import FIELDS, damaged, wrenches_before
 
-from navirl_cli.logs import records
-from navirl_cli.logs.reader import message_times, read, scan
+from navirl_cli.logs.container import records
+from navirl_cli.logs.messages.reader import message_times, read, scan
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from minute_log import (
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.reader import message_times, read, scan
+from navirl_cli.logs.messages.reader import message_times, read, scan
 
 ZEROS = rf"zero bytes where a record should start \(the power or the disk failed\); {BEHIND}"
 

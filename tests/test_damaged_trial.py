@@ -11,8 +11,8 @@ import strict_log
 from robot_log import write_run
 
 from navirl_cli.errors import LogError
+from navirl_cli.logs.container.records import HEAD_SIZE
 from navirl_cli.logs.load import LoadOptions, load_recording
-from navirl_cli.logs.records import HEAD_SIZE
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from navirl_cli.cli import COMMANDS, cli
-from navirl_cli.commands.evaluate_report import METRICS_HEADER, metric_rows
-from navirl_cli.commands.formats import Format, formatted
 from navirl_cli.commands.plot import plot
-from navirl_cli.logs.topics import ROLES
+from navirl_cli.documents.tables import Format, formatted
+from navirl_cli.logs.roles.topics import ROLES
+from navirl_cli.reports.evaluation import METRICS_HEADER, metric_rows
 
 ROOT = Path(__file__).parent.parent
 
@@ -77,7 +77,8 @@ def test_the_demo_runs_what_the_readme_shows():
 def test_architecture_names_the_files_that_stand():
     text = (ROOT / "ARCHITECTURE.md").read_text()
     for path in re.findall(
-        r"`((?:logs|demos|irl|artefacts|evaluation|figures|simulation|published|study|reports|commands)/\w+)", text
+        r"`((?:logs|demos|irl|artefacts|evaluation|figures|simulation|published|study|documents|reports|commands)/[\w/]+)",
+        text,
     ):
         whole = ROOT / "navirl_cli" / path
         assert whole.is_dir() or whole.with_suffix(".py").exists(), path

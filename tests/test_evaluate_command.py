@@ -14,7 +14,7 @@ from scipy import stats
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.cli import cli
-from navirl_cli.commands.formats import Format, formatted
+from navirl_cli.documents.tables import Format, formatted
 from navirl_cli.evaluation.metrics import METRICS
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))

@@ -14,7 +14,6 @@ from navirl_cli.artefacts.demonstrations import demonstrations_document, read_de
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
-from navirl_cli.commands.fit_report import warnings
 from navirl_cli.demos.demonstration import Contact
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.errors import RewardError
@@ -23,6 +22,7 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import fall_at
 from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.fit import warnings
 
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))

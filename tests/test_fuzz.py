@@ -17,7 +17,7 @@ from verdicts import ForbiddenError, check_hits, judge
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.reader import read
+from navirl_cli.logs.messages.reader import read
 from navirl_cli.parallel import cores, map_in_order
 
 COUNT = 2000

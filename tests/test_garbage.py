@@ -12,7 +12,7 @@ import zstandard
 from log_factory import START_NS
 from minute_log import BEHIND, CHANNELS, CUT, Log, body, check, fewest, lost_in, overwritten, sound, unpacked
 
-from navirl_cli.logs.reader import read
+from navirl_cli.logs.messages.reader import read
 
 TOPICS = {channel: topic for topic, channel in CHANNELS.items()}
 

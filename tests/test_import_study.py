@@ -8,8 +8,8 @@ import published_factory as forge
 import pytest
 import study_data
 
+from navirl_cli.logs.messages.writer import message_type
 from navirl_cli.logs.recording import Occupancy
-from navirl_cli.logs.writer import message_type
 from navirl_cli.published.log import ring_m
 
 # What is loaded here is not loaded again by each of the workers that are forked from here.

@@ -8,8 +8,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from navirl_cli.logs.reader import message_times, read, scan
-from navirl_cli.logs.records import HEAD_SIZE, PRIVATE
+from navirl_cli.logs.container.records import HEAD_SIZE, PRIVATE
+from navirl_cli.logs.messages.reader import message_times, read, scan
 
 FIELDS = ("header.stamp", "wrench.force.x")
 WRENCH_ID, ODOMETRY_ID = 1, 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from navirl_cli.logs.topics import ROLES
+from navirl_cli.logs.roles.topics import ROLES
 
 SAMPLES = Path(__file__).parent.parent / "sample_logs"
 

@@ -9,10 +9,10 @@ import schema_factory as factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from navirl_cli.logs import decode
-from navirl_cli.logs.layout import derive
-from navirl_cli.logs.parts import Batch, Channel
-from navirl_cli.logs.schema import Leaf, Schema, SchemaError, parse_definition
+from navirl_cli.logs.container.batches import Batch, Channel
+from navirl_cli.logs.messages import decode
+from navirl_cli.logs.messages.layout import derive
+from navirl_cli.logs.messages.schema import Leaf, Schema, SchemaError, parse_definition
 
 #: Ways to write a message by the name of a run of examples: all in one, or one message like this and one like that.
 WIRES = {

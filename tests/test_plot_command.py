@@ -111,7 +111,7 @@ def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
 
 
 def test_the_styles_offered_are_those_that_there_are():
-    from navirl_cli.commands.plot_page import STYLES
+    from navirl_cli.commands.plot.page import STYLES
     from navirl_cli.figures.style import LOOKS
 
     assert list(STYLES) == list(LOOKS)

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.clocks import Clock, TimeSource
-from navirl_cli.logs.frames import TransformTree
-from navirl_cli.logs.kinds import POSES, TF
 from navirl_cli.logs.load import LoadOptions, load_recording
-from navirl_cli.logs.poses import poses_of
-from navirl_cli.logs.reader import read
-from navirl_cli.logs.setting import Setting
-from navirl_cli.logs.table import Table, wants
-from navirl_cli.logs.transforms import links_of
+from navirl_cli.logs.messages.reader import read
+from navirl_cli.logs.roles.clocks import Clock, TimeSource
+from navirl_cli.logs.roles.columns import Table, wants
+from navirl_cli.logs.roles.context import Setting
+from navirl_cli.logs.roles.message_types import POSES, TF
+from navirl_cli.logs.roles.poses import poses_of
+from navirl_cli.logs.tf.transforms import links_of
+from navirl_cli.logs.tf.tree import TransformTree
 
 
 class Run:

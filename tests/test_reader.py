@@ -12,7 +12,7 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from navirl_cli.logs.reader import read, scan
+from navirl_cli.logs.messages.reader import read, scan
 
 WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x", "wrench.force.z", "wrench.torque.y")
 TF_FIELDS = tuple(

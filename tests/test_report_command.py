@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from test_reports_page import CHROMIUM, Browser
+from test_documents_page import CHROMIUM, Browser
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli

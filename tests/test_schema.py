@@ -7,8 +7,8 @@ import log_factory as forge
 import numpy as np
 import pytest
 
-from navirl_cli.logs.reader import read
-from navirl_cli.logs.schema import JsonSchema, SchemaError, parse_definition
+from navirl_cli.logs.messages.reader import read
+from navirl_cli.logs.messages.schema import JsonSchema, SchemaError, parse_definition
 
 #: Chunks of a message each.
 TINY = {"chunk_size": 1}

@@ -9,10 +9,10 @@ from robot_log import LENGTH_M, START_NS, Run, position_m, write_run
 from navirl_cli.demos.extract import ROBOT_RADIUS_M, ExtractSettings, extract
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.reader import scan
+from navirl_cli.logs.messages.reader import scan
+from navirl_cli.logs.messages.writer import LogWriter
 from navirl_cli.logs.recording import PUBLISHED_RECORD
-from navirl_cli.logs.session import session_of
-from navirl_cli.logs.writer import LogWriter
+from navirl_cli.logs.roles.session import session_of
 
 GOAL_NS = 1_700_000_001_500_000_000
 

@@ -8,10 +8,10 @@ import pytest
 import zstandard
 
 from navirl_cli.errors import LogError
-from navirl_cli.logs.reader import read, scan
-from navirl_cli.logs.records import MAGIC
-from navirl_cli.logs.sniff import check_magic, check_path, decompressed_name
-from navirl_cli.logs.whole import open_log
+from navirl_cli.logs.container.compressed import open_log
+from navirl_cli.logs.container.records import MAGIC
+from navirl_cli.logs.container.sniff import check_magic, check_path, decompressed_name
+from navirl_cli.logs.messages.reader import read, scan
 
 CASES = {
     "ros1.bag": (

@@ -16,7 +16,7 @@ from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
-from navirl_cli.study.text import FIGURES
+from navirl_cli.reports.study import FIGURES
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 ANSWERS = "participant,question,modality,answer\n" + "".join(

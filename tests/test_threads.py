@@ -4,7 +4,7 @@ import log_factory as forge
 import numpy as np
 import pytest
 
-from navirl_cli.logs.reader import read
+from navirl_cli.logs.messages.reader import read
 
 WANTS = {
     "/wrench": ("header.stamp", "header.frame_id", "wrench.force.x"),

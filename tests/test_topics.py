@@ -6,8 +6,8 @@ import pytest
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
-from navirl_cli.logs.reader import scan
-from navirl_cli.logs.topics import Topic, choices, refusal, topics_of
+from navirl_cli.logs.messages.reader import scan
+from navirl_cli.logs.roles.topics import Topic, choices, refusal, topics_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 POSE = "geometry_msgs/msg/PoseStamped"

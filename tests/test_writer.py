@@ -5,8 +5,8 @@ from mcap.reader import make_reader
 
 from navirl_cli import __version__
 from navirl_cli.errors import ArtefactError, LogError
-from navirl_cli.logs.reader import read, scan
-from navirl_cli.logs.writer import LogWriter, header, message_type, time_message
+from navirl_cli.logs.messages.reader import read, scan
+from navirl_cli.logs.messages.writer import LogWriter, header, message_type, time_message
 
 
 def wrench(t_ns, x, frame_id="ft"):

@@ -28,8 +28,8 @@ from small_logs import Base, packed
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.errors import NavirlError
 from navirl_cli.logs.load import load_recording
+from navirl_cli.logs.messages.reader import ReadResult, Series, read, scan
 from navirl_cli.logs.overview import overview
-from navirl_cli.logs.reader import ReadResult, Series, read, scan
 from navirl_cli.logs.recording import Recording
 from navirl_cli.logs.sources import Source
 

@@ -8,8 +8,6 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.evaluate_report import METRICS_HEADER, document, metric_rows, tables
-from navirl_cli.commands.formats import ENDINGS, Format, formatted
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
@@ -24,6 +22,7 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.documents.tables import ENDINGS, Format, formatted
 from navirl_cli.errors import ArtefactError, DemonstrationError
 from navirl_cli.evaluation.compare import FIELDS, compare
 from navirl_cli.evaluation.drawn import MOST, Precision
@@ -32,6 +31,7 @@ from navirl_cli.evaluation.pairs import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import check_writable, replacing
 from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.evaluation import METRICS_HEADER, document, metric_rows, tables
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]

@@ -9,7 +9,6 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document
 from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.extract_report import gain_table, published_notes, trial_row, trial_table
 from navirl_cli.commands.extraction import all_extracted
 from navirl_cli.commands.shared import (
     FilePath,
@@ -30,9 +29,10 @@ from navirl_cli.demos.extract import ExtractSettings, numbered
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split
 from navirl_cli.files import check_writable
-from navirl_cli.logs.clocks import TimeSource
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
+from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.reports.extraction import gain_table, published_notes, trial_row, trial_table
 
 
 @click.command()

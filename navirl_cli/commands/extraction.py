@@ -11,7 +11,7 @@ from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.extract import extract as extract_one
 from navirl_cli.errors import DemonstrationError, LogError, NavirlError
 from navirl_cli.logs.load import LoadOptions, load_recording
-from navirl_cli.logs.reader import Progress
+from navirl_cli.logs.messages.reader import Progress
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import map_in_order
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from navirl_cli.artefacts.rewards import Analyses, LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.fit_report import remarks, report, warnings
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
@@ -40,6 +39,7 @@ from navirl_cli.irl.profile import profile as follow_profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.validation import cross_validate as leave_out
+from navirl_cli.reports.fit import remarks, report, warnings
 
 
 @click.command()

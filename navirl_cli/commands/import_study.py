@@ -15,8 +15,8 @@ from navirl_cli.commands.shared import (
     output_option,
     progress_bar,
     say,
-    text_table,
 )
+from navirl_cli.documents.tables import text_table
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import check_writable, make_folder
 from navirl_cli.parallel import map_in_order

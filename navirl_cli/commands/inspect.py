@@ -13,15 +13,15 @@ from navirl_cli.commands.shared import (
     finish,
     json_option,
     say,
-    text_table,
     topic_option,
     topics_by_role,
 )
+from navirl_cli.documents.tables import text_table
 from navirl_cli.errors import LogError
-from navirl_cli.logs.clocks import EARLIEST_NS, NS_PER_S
 from navirl_cli.logs.overview import Flow, Overview, overview
+from navirl_cli.logs.roles.clocks import EARLIEST_NS, NS_PER_S
+from navirl_cli.logs.roles.topics import short_name
 from navirl_cli.logs.sources import sources_of
-from navirl_cli.logs.topics import short_name
 
 
 @click.command()

@@ -44,11 +44,11 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     """
     import numpy as np
 
-    from navirl_cli.commands.report_text import report_of
+    from navirl_cli.documents.page import to_html
     from navirl_cli.evaluation.compare import compare
     from navirl_cli.evaluation.ranks import ranks_of
     from navirl_cli.figures.report import draw_report
-    from navirl_cli.reports.page import to_html
+    from navirl_cli.reports.reward import report_of
 
     if output.suffix != ".html":
         raise ArtefactError(f"{output}: expected a name that ends in .html, found {output.suffix!r}")

@@ -103,17 +103,6 @@ class Point(click.ParamType):  # type: ignore[type-arg]
         return x, y
 
 
-def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns aligned by their widest entry; those that begin with a digit or a sign to the right."""
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    right = [all(row[i][:1] in "-+0123456789n" for row in rows) for i in range(len(header))]
-    lines = []
-    for row in (header, *rows):
-        cells = [cell.rjust(w) if r else cell.ljust(w) for cell, w, r in zip(row, widths, right, strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
-
-
 def echo_json(document: Any) -> None:
     """JSON on stdout."""
     click.echo(json.dumps(document, indent=2, allow_nan=False))

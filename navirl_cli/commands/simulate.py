@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option, text_table
+from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option
+from navirl_cli.documents.tables import text_table
 from navirl_cli.files import check_writable, make_folder
 from navirl_cli.parallel import map_in_order
 

@@ -22,18 +22,18 @@ from navirl_cli.commands.shared import (
     progress_bar,
     say,
     seed_option,
-    text_table,
     topic_option,
     topics_by_role,
 )
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
+from navirl_cli.documents.tables import text_table
 from navirl_cli.files import check_writable, make_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
+    from navirl_cli.reports.study import Told
     from navirl_cli.study.pipeline import Study
-    from navirl_cli.study.text import Told
 
 REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demos.json"
 
@@ -75,13 +75,13 @@ def study(
     and all second cycles together. Writes report.md, report.html (the same in one file), summary.json (every number of
     the tables), demos.json and figures/.
     """
+    from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study
+    from navirl_cli.reports.study import FIGURES, Told
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
     from navirl_cli.study.remarks import remarks
-    from navirl_cli.study.summary import study_document
-    from navirl_cli.study.text import FIGURES, Told
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
@@ -160,7 +160,7 @@ def _folder(output: Path, *, force: bool) -> Path:
         ArtefactError: A folder cannot be made, or a file exists already.
     """
     from navirl_cli.figures.study import FORMATS
-    from navirl_cli.study.text import FIGURES
+    from navirl_cli.reports.study import FIGURES
 
     figures = make_folder(output / "figures")
     names = [figures / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
@@ -182,9 +182,9 @@ def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[floa
 
 def _write_report(output: Path, study: "Study", told: "Told", *, force: bool) -> None:
     """The report as Markdown and as one page."""
-    from navirl_cli.reports.markdown import to_markdown
-    from navirl_cli.reports.page import to_html
-    from navirl_cli.study.text import report_of
+    from navirl_cli.documents.markdown import to_markdown
+    from navirl_cli.documents.page import to_html
+    from navirl_cli.reports.study import report_of
 
     report = report_of(study, told)
     for name, text in ((REPORT, to_markdown(report, output)), (PAGE, to_html(report))):
@@ -194,8 +194,8 @@ def _write_report(output: Path, study: "Study", told: "Told", *, force: bool) ->
 
 def _overview(study: "Study", told: "Told") -> str:
     """The learnt rewards and the verdicts, as text."""
-    from navirl_cli.study.tables import rewards_table
-    from navirl_cli.study.text import claims_lines
+    from navirl_cli.reports.study import claims_lines
+    from navirl_cli.reports.study_tables import rewards_table
 
     table = rewards_table(study)
     lines = [text_table(table.header, table.rows), "", *claims_lines(study.claims)]

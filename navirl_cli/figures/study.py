@@ -21,9 +21,9 @@ from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, scenes_of
 from navirl_cli.parallel import map_in_order
+from navirl_cli.reports.study import FIGURES
 from navirl_cli.study.pipeline import Study
 from navirl_cli.study.questionnaire import Shares
-from navirl_cli.study.text import FIGURES
 from navirl_cli.study.unseen import beside_obstacle, two_people
 
 #: Formats of every figure: for reports, and for papers.
@@ -46,7 +46,7 @@ def draw_study(
     Args:
         study: The numbers.
         bars: Answers to a questionnaire; none where there is none.
-        folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.study.text.FIGURES`.
+        folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.reports.study.FIGURES`.
         force: Replace existing files; those of an earlier run that have no data now are deleted.
         progress: Called with the number of figures drawn and the name of the last.
         executor: Where to draw; by default local processes.

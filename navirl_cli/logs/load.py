@@ -11,22 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.clocks import Clock, Stamped, TimeSource, in_order
-from navirl_cli.logs.frames import TransformTree
-from navirl_cli.logs.maps import map_in, occupancy_of
-from navirl_cli.logs.parts import Damage
-from navirl_cli.logs.people import goals_of, people_of
-from navirl_cli.logs.poses import poses_of
-from navirl_cli.logs.reader import Contents, Progress, ReadResult, read, scan
+from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.messages.reader import Contents, Progress, ReadResult, read, scan
 from navirl_cli.logs.recording import FloatArray, IntArray, Occupancy, Recording, Wrench
-from navirl_cli.logs.session import session_of
-from navirl_cli.logs.setting import Setting
-from navirl_cli.logs.sound import FORCES
+from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order
+from navirl_cli.logs.roles.columns import Table, wants
+from navirl_cli.logs.roles.context import Setting
+from navirl_cli.logs.roles.maps import map_in, occupancy_of
+from navirl_cli.logs.roles.people import goals_of, people_of
+from navirl_cli.logs.roles.plausible import FORCES
+from navirl_cli.logs.roles.poses import poses_of
+from navirl_cli.logs.roles.session import session_of
+from navirl_cli.logs.roles.topics import Choice, choices, is_missed, refusal, topics_of
 from navirl_cli.logs.sources import Source
-from navirl_cli.logs.table import Table, wants
-from navirl_cli.logs.topics import Choice, choices, is_missed, refusal, topics_of
-from navirl_cli.logs.transforms import Link, links_of
-from navirl_cli.logs.whole import Opened, open_log
+from navirl_cli.logs.tf.transforms import Link, links_of
+from navirl_cli.logs.tf.tree import TransformTree
 
 #: The frame of a map from a file, as Nav2's map server names it.
 _MAP_FRAME = "map"

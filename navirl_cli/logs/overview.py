@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.logs.clocks import APART_S, NS_PER_S, Clock, Stamped
-from navirl_cli.logs.container import LogFile, threads_here
-from navirl_cli.logs.parts import Batch, Damage
-from navirl_cli.logs.reader import Contents, Progress, message_times
+from navirl_cli.logs.container.batches import Batch, Damage
+from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.log_file import LogFile, threads_here
+from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.recording import IntArray
+from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
+from navirl_cli.logs.roles.topics import Choice, Topic, choices, is_missed, topics_of
 from navirl_cli.logs.sample import first_messages
 from navirl_cli.logs.sources import Source
-from navirl_cli.logs.topics import Choice, Topic, choices, is_missed, topics_of
-from navirl_cli.logs.whole import Opened, open_log
 
 #: A topic that comes at least this often is silent where it pauses this many times longer than usual, and this long.
 _REGULAR_S, _PAUSE, _SILENT_S = 1.0, 5.0, 0.5

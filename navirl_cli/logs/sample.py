@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.logs import kinds
-from navirl_cli.logs.clocks import Stamped
-from navirl_cli.logs.container import LogFile
-from navirl_cli.logs.decode import Decoder, Part
-from navirl_cli.logs.frames import TransformTree
-from navirl_cli.logs.parts import Channel
-from navirl_cli.logs.schema import Schema, SchemaError, full_name, parse_definition
-from navirl_cli.logs.transforms import Link, links_of
-from navirl_cli.logs.whole import Opened
+from navirl_cli.logs.container.batches import Channel
+from navirl_cli.logs.container.compressed import Opened
+from navirl_cli.logs.container.log_file import LogFile
+from navirl_cli.logs.messages.decode import Decoder, Part
+from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
+from navirl_cli.logs.roles import message_types
+from navirl_cli.logs.roles.clocks import Stamped
+from navirl_cli.logs.tf.transforms import Link, links_of
+from navirl_cli.logs.tf.tree import TransformTree
 
 #: Chunks in whose messages stamps are looked for.
 _SAMPLED = 8
 _STAMP = "header.stamp"
-_TF_STAMP = kinds.TF.fields[_STAMP]
+_TF_STAMP = message_types.TF.fields[_STAMP]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def first_messages(files: Sequence[Opened]) -> Sample:
     for topic, some in parts.items():
         if _TF_STAMP in some[0].columns:
             (static if topic.endswith("tf_static") else moving).extend(
-                link for part in some for link in links_of(part.columns, part.counts[kinds.TF.sequence or ""])
+                link for part in some for link in links_of(part.columns, part.counts[message_types.TF.sequence or ""])
             )
     stamped = {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
     return Sample(stamped, TransformTree(static, moving).describe() if static or moving else "")
@@ -68,8 +68,8 @@ def first_messages(files: Sequence[Opened]) -> Sample:
 
 def _decoder(channel: Channel) -> Decoder | None:
     """A decoder of a channel's stamps, or of all of its transforms; None where it has none or cannot be decoded."""
-    tf = full_name(channel.schema_name) == kinds.TF.type_name
-    paths = tuple(kinds.TF.fields.values()) if tf else (_STAMP,)
+    tf = full_name(channel.schema_name) == message_types.TF.type_name
+    paths = tuple(message_types.TF.fields.values()) if tf else (_STAMP,)
     try:
         schema = parse_definition(
             channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding
@@ -88,7 +88,7 @@ def _stamped(topic: str, parts: Sequence[Part]) -> Stamped | None:
             logs.append(part.log_time_ns)
             stamps.append(part.columns[_STAMP])
         else:
-            counts = part.counts[kinds.TF.sequence or ""]
+            counts = part.counts[message_types.TF.sequence or ""]
             some = counts > 0
             logs.append(part.log_time_ns[some])
             stamps.append(part.columns[_TF_STAMP][(np.cumsum(counts) - counts)[some]])

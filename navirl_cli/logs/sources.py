@@ -11,8 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from navirl_cli.errors import LogError
-from navirl_cli.logs.parts import Damage
-from navirl_cli.logs.sniff import CONVERT, check_path
+from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.sniff import CONVERT, check_path
 from navirl_cli.logs.yaml_file import brief, read_mapping
 
 _METADATA: Final = "metadata.yaml"

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from navirl_cli.demos.grid import INSCRIBED, LETHAL, FloatArray, IntArray
+from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Occupancy
-from navirl_cli.logs.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.published.participant import Participant, PublishedPath
 
 #: The paper's speed along x (v_nav, Sec. V), m/s: at it positions are laid out, for they come without times.

@@ -1,1 +1,1 @@
-"""Documents for a reader: blocks of text, tables and pictures -> Markdown, or one HTML file."""
+"""The words of results: what a command prints and what a page says."""

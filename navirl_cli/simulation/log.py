@@ -11,8 +11,8 @@ import numpy as np
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import SESSION_RECORD
-from navirl_cli.logs.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.simulation import protocol, sensors
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
 from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M

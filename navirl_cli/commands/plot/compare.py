@@ -1,0 +1,118 @@
+"""Figures that set rewards, or groups of demonstrations, beside each other or beside chance."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.commands.plot.maps import Sight, trial_of
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_option
+from navirl_cli.commands.shared import FilePath, demonstrations_in, demos_argument, progress_bar, seed_option
+from navirl_cli.errors import DemonstrationError
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
+
+_GROUP = "A condition with cycle and set, as in the tables of evaluate, e.g. 'force, cycle 2'"
+
+
+@click.command()
+@page_options
+@demos_argument
+@reward_option
+@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
+@click.option(
+    "--samples",
+    default=1000,
+    show_default=True,
+    type=click.IntRange(1, 100_000),
+    help="Paths of the policy among which each demonstration ranks.",
+)
+@seed_option
+def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
+    """Ranks of demonstrations among the policy's own paths by log-likelihood: uniform where the policy is right."""
+    import numpy as np
+
+    from navirl_cli.evaluation.ranks import ranks_of
+    from navirl_cli.figures.ranks import draw_ranks
+
+    demonstrations = demonstrations_in(demos)
+    learnt = read_reward_for(reward, demonstrations).reward
+    chosen = [one for own in _groups(demonstrations, groups) for one in own] if groups else demonstrations
+    with progress_bar("rank", len(chosen)) as update:
+        found = ranks_of(
+            chosen, learnt, samples, np.random.default_rng(seed), progress=lambda done, _all: update(done, "")
+        )
+    page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found])))
+
+
+@click.command()
+@page_options
+@demos_argument
+@click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more.")
+@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more.")
+@trial_option
+@crop_option
+def compare(
+    page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
+) -> None:
+    """Rewards beside each other in the scene of one trial (policy and state reward), or paths of groups."""
+    if min(len(rewards), len(groups)) > 0 or max(len(rewards), len(groups)) < 2:
+        raise click.UsageError("compare needs two or more --reward, or two or more --group")
+    if groups and trial is not None:
+        raise click.UsageError("--trial chooses the scene of --reward; groups are drawn with all their trials")
+    demonstrations = demonstrations_in(demos)
+    if groups:
+        _draw_groups(page, demonstrations, groups, crop=crop)
+    else:
+        _draw_rewards(page, demonstrations, rewards, trial, crop=crop)
+
+
+def _draw_groups(page: Page, demonstrations: Sequence["Demonstration"], groups: Sequence[str], *, crop: bool) -> None:
+    """A panel of paths for each group."""
+    from navirl_cli.figures.conditions import draw_path_panels
+
+    panels = list(zip(groups, _groups(demonstrations, groups), strict=True))
+    page.draw(lambda axes: draw_path_panels(axes, panels, crop=crop), panels=len(panels), columns=2)
+
+
+def _draw_rewards(
+    page: Page, demonstrations: Sequence["Demonstration"], rewards: Sequence[Path], trial: str | None, *, crop: bool
+) -> None:
+    """A row of policy and state reward for each reward, all with the same colours for the same numbers."""
+    import numpy as np
+
+    from navirl_cli.figures.cells import LEAST_VISITS, likely_window, scene_window
+    from navirl_cli.figures.policies import draw_policy_and_reward
+
+    one = trial_of(demonstrations, trial)
+    learnt = {path: read_reward_for(path, demonstrations).reward for path in rewards}
+    first = Sight(demonstrations, one, learnt[rewards[0]], crop=crop)
+    scene, rows = first.scene, []
+    for path in rewards:
+        sight = replace(first, reward=learnt[path])
+        name = path.stem if [other.stem for other in rewards].count(path.stem) == 1 else str(path)
+        rows.append((name, scene, sight.visits, sight.reward.by_cell(scene)))
+    most = np.max([visits for _, _, visits, _ in rows], axis=0)
+    window = likely_window(scene, most) if crop else scene_window(scene, most >= LEAST_VISITS)
+    page.draw(
+        lambda axes: draw_policy_and_reward(axes, rows, one.robot_radius_m, window), panels=2 * len(rows), columns=2
+    )
+
+
+def _groups(demonstrations: Sequence["Demonstration"], names: Sequence[str]) -> list[list["Demonstration"]]:
+    """The demonstrations of groups.
+
+    Raises:
+        DemonstrationError: There is none of a group.
+    """
+    from navirl_cli.evaluation.compare import by_group
+
+    known = by_group(demonstrations)
+    for name in names:
+        if name not in known:
+            raise DemonstrationError(f"no group is called {name!r}; there are {', '.join(map(repr, known))}")
+    return [known[name] for name in names]

@@ -1,0 +1,167 @@
+"""Figures of one scene: where the learnt policy leads, and what it goes by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_option
+from navirl_cli.commands.shared import Function, demonstrations_in, demos_argument, seed_option
+from navirl_cli.errors import DemonstrationError
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
+    from navirl_cli.demos.grid import FloatArray
+    from navirl_cli.figures.cells import CellOptions
+    from navirl_cli.figures.overlay import Overlay
+    from navirl_cli.irl.reward import Reward
+    from navirl_cli.irl.scene import Scene
+    from navirl_cli.irl.values import Policy
+
+#: What --overlay takes.
+DEMOS, SAMPLES = "demos", "samples"
+
+
+def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "Demonstration":
+    """The demonstration that was asked for, or the first.
+
+    Raises:
+        DemonstrationError: None is called so.
+    """
+    for one in demonstrations:
+        if trial in {None, one.id}:
+            return one
+    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One scene under a learnt reward, and what is to be drawn over it."""
+
+    demonstrations: Sequence["Demonstration"]
+    one: "Demonstration"
+    reward: "Reward"
+    crop: bool
+    overlay: tuple[str, ...] = ()
+    samples: int = 0
+    seed: int = 0
+
+    @cached_property
+    def scene(self) -> "Scene":
+        """The chosen trial's."""
+        from navirl_cli.irl.scene import scenes_of
+
+        return scenes_of([self.one])[0]
+
+    @cached_property
+    def policy(self) -> "Policy":
+        """The learnt one."""
+        from navirl_cli.irl.likelihood import policy_of
+
+        return policy_of(self.reward, self.scene)
+
+    @cached_property
+    def visits(self) -> "FloatArray":
+        """(n,) expected visits of every state."""
+        import numpy as np
+
+        start = np.zeros(self.scene.lattice.size)
+        start[self.scene.start] = 1.0
+        return self.policy.visits(start)
+
+    @property
+    def options(self) -> "CellOptions":
+        """What all figures of the scene share; a cropped one shows the same in all of them."""
+        from navirl_cli.figures.cells import likely_window
+
+        overlays = self._overlays()
+        lines = [line for kind in overlays for line in kind.lines_m]
+        window = likely_window(self.scene, self.visits, lines) if self.crop else None
+        return {"robot_radius_m": self.one.robot_radius_m, "window_m": window, "overlays": overlays}
+
+    def _overlays(self) -> list["Overlay"]:
+        """Paths to be drawn over the map, driven ones below."""
+        import numpy as np
+
+        from navirl_cli.evaluation.compare import LEARNT, by_group
+        from navirl_cli.figures.overlay import Overlay, alike
+        from navirl_cli.irl.paths import sample_paths, sampled_lines_m
+
+        overlays = []
+        if DEMOS in self.overlay:
+            groups = by_group(alike(self.demonstrations, self.one))
+            overlays += [Overlay(group, group, [one.xy_m for one in own]) for group, own in groups.items()]
+        if SAMPLES in self.overlay:
+            paths = sample_paths(self.policy, self.scene.start, self.samples, np.random.default_rng(self.seed))
+            overlays.append(Overlay("drawn from the policy", LEARNT, sampled_lines_m(self.policy, paths)))
+        return overlays
+
+
+def scene_options(function: Function) -> Function:
+    """Options of figures of one scene, handed over as ``page`` and ``sight``."""
+
+    @wraps(function)
+    def packed(page: Page, demos: Path, reward: Path, trial: str | None, **others: Any) -> Any:
+        demonstrations = demonstrations_in(demos)
+        learnt = read_reward_for(reward, demonstrations).reward
+        return function(page, Sight(demonstrations, trial_of(demonstrations, trial), learnt, **others))
+
+    options = (
+        demos_argument,
+        reward_option,
+        trial_option,
+        crop_option,
+        click.option(
+            "--overlay",
+            multiple=True,
+            type=click.Choice((DEMOS, SAMPLES)),
+            help="Draw paths over the map: demonstrated in this scene, or drawn from the policy; repeatable.",
+        ),
+        click.option(
+            "--samples", default=20, show_default=True, type=click.IntRange(1, 1000), help="Paths of --overlay samples."
+        ),
+        seed_option,
+    )
+    for decorate in reversed(options):
+        packed = decorate(packed)
+    return page_options(packed)  # type: ignore[return-value]
+
+
+@click.command()
+@scene_options
+def policy(page: Page, sight: Sight) -> None:
+    """Where the learnt policy leads: expected visits of every cell (as the paper's Fig. 8, left)."""
+    from navirl_cli.figures.cells import draw_policy
+
+    page.draw(lambda axes: draw_policy(axes[0], sight.scene, sight.visits, **sight.options))
+
+
+@click.command()
+@scene_options
+def reward(page: Page, sight: Sight) -> None:
+    """The learnt reward of every cell, with the nominal path (as the paper's Fig. 8, right)."""
+    from navirl_cli.figures.cells import draw_reward
+
+    page.draw(lambda axes: draw_reward(axes[0], sight.scene, sight.reward.by_cell(sight.scene), **sight.options))
+
+
+@click.command()
+@scene_options
+def value(page: Page, sight: Sight) -> None:
+    """The soft value of every cell: expected reward on the way to the goal, with lines of equal value."""
+    from navirl_cli.figures.values import draw_value
+
+    page.draw(lambda axes: draw_value(axes[0], sight.scene, sight.policy.value, **sight.options))
+
+
+@click.command()
+@scene_options
+def actions(page: Page, sight: Sight) -> None:
+    """The most likely move in every cell as an arrow, the longer the surer."""
+    from navirl_cli.figures.actions import draw_actions
+
+    page.draw(lambda axes: draw_actions(axes[0], sight.scene, sight.policy.probability, **sight.options))

@@ -1,0 +1,1 @@
+"""Documents for a reader: blocks of text, tables and pictures -> Markdown, or one HTML file."""

@@ -1,0 +1,181 @@
+"""A report as one HTML file that needs nothing else: no network, no other file."""
+
+import re
+from base64 import b64encode
+from collections.abc import Iterable
+from functools import cache
+from hashlib import sha256
+from html import escape
+from importlib.resources import files
+
+from navirl_cli.documents.cells import is_missing, number_of, numeric_columns
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report, Table
+from navirl_cli.documents.inline import Mark, plain_of, runs_of
+from navirl_cli.documents.pictures import alt_of, read_picture, shown_size
+
+_TAGS = {Mark.CODE: "code", Mark.STRONG: "strong"}
+#: A text up to where a long word, such as a hash, may be broken.
+_PIECES = re.compile(r".*?\S{16}(?=\S{16})|.+")
+#: The class of a cell, by whether its column holds numbers.
+_CLASS = {False: "", True: ' class="number"'}
+
+
+def to_html(report: Report) -> str:
+    """Write a report as a page.
+
+    Args:
+        report: What to write.
+
+    Returns:
+        The page; the same report and pictures give the same text.
+
+    Raises:
+        ArtefactError: A picture is missing, or neither .png nor .svg.
+    """
+    names = _names(report)
+    parts = [f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{_head(report.title)}\n</head>\n<body>']
+    parts.append(f"<header><h1>{_inline(report.title)}</h1></header>")
+    parts.append(_contents(report, names))
+    parts += ["<main>", *(_block(block, name) for block, name in zip(report.blocks, names, strict=True)), "</main>"]
+    if report.footer:
+        parts.append(f"<footer><p>{_inline(report.footer)}</p></footer>")
+    parts.append(f"<script>{_resource('page.js')}</script>\n</body>\n</html>\n")
+    return "\n".join(part for part in parts if part)
+
+
+def _head(title: str) -> str:
+    """Title, style and what the page may do: show what it holds and run the one script below, nothing else."""
+    style = _resource("page.css")
+    policy = (
+        "default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
+        f"style-src '{_hash(style)}'; script-src '{_hash(_resource('page.js'))}'"
+    )
+    return "\n".join(
+        (
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            f"<title>{escape(plain_of(title))}</title>",
+            '<link rel="icon" href="data:,">',  # without one a browser asks the server for it
+            f"<style>{style}</style>",
+        )
+    )
+
+
+@cache
+def _resource(name: str) -> str:
+    """A file beside this one."""
+    return (files("navirl_cli.documents") / name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    """How a Content-Security-Policy names an inline style or script."""
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
+
+
+def _names(report: Report) -> list[str]:
+    """An id for every heading and "" for other blocks: its words, numbered where they repeat."""
+    names: list[str] = []
+    for block in report.blocks:
+        if not isinstance(block, Heading):
+            names.append("")
+            continue
+        words = re.sub(r"\W+", "-", plain_of(block.text).casefold()).strip("-") or "section"
+        name, count = words, 1
+        while name in names:
+            count += 1
+            name = f"{words}-{count}"
+        names.append(name)
+    return names
+
+
+def _contents(report: Report, names: list[str]) -> str:
+    """Links to the headings of level 2, or nothing where there are none."""
+    items = [
+        f'<li><a href="#{name}">{_inline(block.text)}</a></li>'
+        for block, name in zip(report.blocks, names, strict=True)
+        if isinstance(block, Heading) and block.level == 2
+    ]
+    return f'<nav aria-label="Contents">\n<ul>\n{_lines(items)}\n</ul>\n</nav>' if items else ""
+
+
+def _block(block: Block, name: str) -> str:
+    """One block; `name` is a heading's id."""
+    match block:
+        case Heading(text, level):
+            return f'<h{level} id="{name}">{_inline(text)}</h{level}>'
+        case Paragraph(text):
+            return f"<p>{_inline(text)}</p>"
+        case Bullets(items):
+            return f"<ul>\n{_lines(f'<li>{_inline(item)}</li>' for item in items)}\n</ul>" if items else ""
+        case Table():
+            return _table(block)
+        case Picture():
+            return _picture(block)
+
+
+def _inline(text: str) -> str:
+    """A text with its marks as elements and everything else escaped."""
+    pieces = []
+    for run in runs_of(text):
+        escaped = "<wbr>".join(escape(piece) for piece in _PIECES.findall(run.text))
+        tag = _TAGS.get(run.mark)
+        pieces.append(f"<{tag}>{escaped}</{tag}>" if tag else escaped)
+    return "".join(pieces)
+
+
+def _table(table: Table) -> str:
+    """A table that scrolls in itself, with what it is sorted by beside the cells."""
+    numeric = numeric_columns(table)
+    head = [
+        _cell(text, "th", f' scope="col"{_CLASS[right]}') for text, right in zip(table.header, numeric, strict=True)
+    ]
+    caption = f"<figcaption>{_inline(table.caption)}</figcaption>\n" if table.caption else ""
+    label = escape(plain_of(table.caption) or "Table")
+    return (
+        f'<figure class="table">\n{caption}<div class="scroll" role="region" tabindex="0" aria-label="{label}">\n'
+        f"<table>\n<thead>\n{_row(head)}\n</thead>\n<tbody>\n"
+        f"{_lines(_row(_cells(row, numeric)) for row in table.rows)}\n</tbody>\n</table>\n</div>\n</figure>"
+    )
+
+
+def _row(cells: Iterable[str]) -> str:
+    """A table's row."""
+    return f"<tr>\n{_lines(cells)}\n</tr>"
+
+
+def _cells(row: tuple[str, ...], numeric: tuple[bool, ...]) -> list[str]:
+    """The cells of a row; the first one names the row, unless its column holds numbers."""
+    cells = [_cell(text, "td", _CLASS[right] + _sort_key(text)) for text, right in zip(row, numeric, strict=True)]
+    if not numeric[0]:
+        cells[0] = _cell(row[0], "th", f' scope="row"{_sort_key(row[0])}')
+    return cells
+
+
+def _cell(text: str, tag: str, attributes: str) -> str:
+    """One cell."""
+    return f"<{tag}{attributes}>{_inline(text)}</{tag}>"
+
+
+def _sort_key(text: str) -> str:
+    """What the script sorts a cell by, other than its text."""
+    if is_missing(text):
+        return " data-missing"
+    number = number_of(text)
+    return "" if number is None else f' data-number="{str(number).replace("inf", "Infinity")}"'
+
+
+def _picture(picture: Picture) -> str:
+    """A picture with its bytes, and its caption."""
+    kind, content = read_picture(picture.path)
+    size = shown_size(content)
+    attributes = f' width="{size[0]}" height="{size[1]}"' if size else ""
+    source = f"data:{kind};base64,{b64encode(content).decode()}"
+    caption = f"\n<figcaption>{_inline(picture.caption)}</figcaption>" if picture.caption else ""
+    return f'<figure>\n<img src="{source}" alt="{escape(alt_of(picture))}"{attributes}>{caption}\n</figure>'
+
+
+def _lines(parts: Iterable[str]) -> str:
+    """Parts, one a line."""
+    return "\n".join(parts)

@@ -1,0 +1,250 @@
+"""Files to read from, whether they are MCAP as they are or compressed as a whole with zstd or lz4.
+
+A compressed file is decompressed block by block (zstd: RFC 8878, 3.1.1; lz4: LZ4 Frame Format 1.6) into a temporary
+file, so that all blocks before a cut or a damaged one are kept, and memory holds one block.
+"""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Final, Self
+
+import zstandard
+
+from navirl_cli.errors import LogError
+from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.sniff import check_magic, check_path, decompressed_name
+
+_ZSTD: Final = b"\x28\xb5\x2f\xfd"
+_LZ4: Final = b"\x04\x22\x4d\x18"
+#: A frame of something else (0x50 to 0x5f stand before this), which both formats allow and skip.
+_SKIPPED: Final = b"\x2a\x4d\x18"
+#: A zstd frame may ask for 2 GB of memory; libzstd refuses more than this, which `zstd --ultra -22` asks for.
+_MAX_WINDOW_BYTES: Final = 128 << 20
+_MAX_LZ4_BLOCK_BYTES: Final = 4 << 20
+#: Enough to tell what a file is.
+_HEAD_BYTES: Final = 512
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A file to read MCAP from; whoever asked for it closes it."""
+
+    path: Path
+    #: Seekable, with a file descriptor; its offsets are those of the MCAP bytes, decompressed where need be.
+    file: BinaryIO
+    #: Bytes of MCAP.
+    size: int
+    #: What could not be decompressed, in bytes of the compressed file.
+    damage: tuple[Damage, ...]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.file.close()
+
+
+def open_log(path: Path) -> Opened:
+    """Open a file, and decompress it into a temporary one where it is compressed as a whole.
+
+    Args:
+        path: An MCAP file, or one in zstd or lz4 frames; what it is is told by its bytes, not by its name.
+
+    Raises:
+        LogError: There is no such file or it cannot be read; it holds no MCAP; nothing of it decompresses; there is no
+            room for what it decompresses to.
+    """
+    check_path(path)
+    with ExitStack() as on_failure:
+        try:
+            file = on_failure.enter_context(path.open("rb"))
+            size = os.fstat(file.fileno()).st_size
+            head = file.read(_HEAD_BYTES)
+            file.seek(0)
+        except OSError as error:
+            raise LogError(f"{path}: expected a readable file, found: {error.strerror}; check its rights") from error
+        if kind := _compression(head):
+            return _decompressed(path, file, size, kind)
+        check_magic(path, head, size)
+        on_failure.pop_all()
+    return Opened(path, file, size, ())
+
+
+def _compression(head: bytes) -> str:
+    """What a file of these first bytes is compressed with, empty for nothing."""
+    if head.startswith(_LZ4):
+        return "lz4"
+    return "zstd" if head.startswith(_ZSTD) or _is_skipped(head) else ""
+
+
+def _is_skipped(head: bytes) -> bool:
+    return head[1:4] == _SKIPPED and head[0] >> 4 == 5
+
+
+def _decompressed(path: Path, file: BinaryIO, size: int, kind: str) -> Opened:
+    """The decompressed bytes of a file, as far as they can be had."""
+    damage: list[Damage] = []
+    done = 0
+    with ExitStack() as on_failure:
+        try:
+            target = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it
+            on_failure.callback(_discard, target)
+            for raw in _Unpacking(path, file, size, kind, damage).blocks():
+                target.write(raw)
+                done += len(raw)
+            target.seek(0)
+        except OSError as error:
+            folder = tempfile.tempdir or os.environ.get("TMPDIR", "/tmp")  # noqa: S108 - where Python looks first
+            raise LogError(
+                f"{path}: expected room in {folder} for what it decompresses to, found: {error.strerror} after {done} "
+                "bytes; free some, or name another folder in the environment variable TMPDIR"
+            ) from error
+        if damage and not done:
+            raise LogError(f"{path}: expected MCAP compressed with {kind}, found: {damage[0].reason}; copy it again")
+        check_magic(path, target.read(_HEAD_BYTES), done, kind)
+        target.seek(0)
+        on_failure.pop_all()
+    return Opened(path, target, done, tuple(damage))
+
+
+def _discard(target: BinaryIO) -> None:
+    """Close a file, even where its last bytes find no room."""
+    with suppress(OSError):
+        target.close()
+
+
+@dataclass
+class _Unpacking:
+    """Goes over the frames of a compressed file."""
+
+    path: Path
+    file: BinaryIO
+    size: int
+    kind: str
+    damage: list[Damage]
+    #: Where the piece starts that is being read, and its bytes so far.
+    at: int = 0
+    piece: bytes = b""
+
+    def blocks(self) -> Iterator[bytes]:
+        """Yield the decompressed blocks; what ends them before their time is noted as damage."""
+        while self.at < self.size:
+            start, head = self.at, self._peeked()
+            if _is_skipped(head):
+                self._skip()
+            elif head == _ZSTD:
+                yield from self._frame(
+                    start, self._zstd_pieces(), zstandard.ZstdDecompressor().decompressobj().decompress
+                )
+            elif head == _LZ4:
+                yield from self._frame(start, self._lz4_pieces(), _lz4())
+            else:
+                self._stop(f"no {self.kind} frame starts here ({head.hex(' ')}); what stands here is lost")
+
+    def _frame(self, start: int, pieces: Iterator[str], decompress: Callable[[bytes], bytes]) -> Iterator[bytes]:
+        """Yield what one frame holds."""
+        closing = False
+        try:
+            for what in pieces:
+                closing = what == "checksum"
+                raw = decompress(self.piece)
+                self.at, self.piece = self.at + len(self.piece), b""
+                yield raw
+        except EOFError:
+            with suppress(zstandard.ZstdError, RuntimeError):
+                # a block that is stored as it is can be used in part
+                yield decompress(self.piece)
+            self._stop(f"the {self.kind} compression is cut; what stood behind is lost, what stands before is read")
+        except (zstandard.ZstdError, RuntimeError) as error:
+            if not closing:
+                self._stop(f"the {self.kind} compression is damaged ({error}); what stands here and behind is lost")
+                return
+            stop = self.at + len(self.piece)
+            reason = f"the {self.kind} checksum is wrong; some of what it decompresses to is damaged, not known where"
+            self.damage.append(Damage(self.path, start, stop, reason))
+            self.at, self.piece = stop, b""
+
+    def _zstd_pieces(self) -> Iterator[str]:
+        """Read a zstd frame into `piece`, yielding what each piece is."""
+        descriptor = self._take(5)[4]
+        single = descriptor >> 5 & 1
+        self._take(1 - single + (0, 1, 2, 4)[descriptor & 3] + (single, 2, 4, 8)[descriptor >> 6])
+        window = zstandard.get_frame_parameters(self.piece).window_size
+        if window > _MAX_WINDOW_BYTES:
+            raise LogError(
+                f"{self.path}: expected a zstd frame with a window of at most {_MAX_WINDOW_BYTES >> 20} MiB, found "
+                f"one of {window >> 20} MiB; decompress it first: "
+                f"zstd -d --long=31 {self.path} -o {decompressed_name(self.path)}"
+            )
+        yield "head"
+        last = False
+        while not last:
+            mark = int.from_bytes(self._take(3), "little")
+            last, repeated = bool(mark & 1), mark >> 1 & 3 == 1
+            self._take(1 if repeated else mark >> 3)
+            yield "block"
+        if descriptor & 4:
+            self._take(4)
+            yield "checksum"
+
+    def _lz4_pieces(self) -> Iterator[str]:
+        """Read an lz4 frame into `piece`, yielding what each piece is."""
+        flags = self._take(6)[4]
+        self._take(1 + 8 * (flags >> 3 & 1) + 4 * (flags & 1))
+        yield "head"
+        while mark := int.from_bytes(self._take(4), "little") & 0x7FFFFFFF:
+            if mark > _MAX_LZ4_BLOCK_BYTES:
+                raise RuntimeError(f"a block of {mark} bytes")
+            self._take(mark + 4 * (flags >> 4 & 1))
+            yield "block"
+        self._take(4 * (flags >> 2 & 1))
+        yield "checksum"
+
+    def _take(self, count: int) -> bytes:
+        data = self._read(count)
+        self.piece += data
+        if len(data) < count:
+            raise EOFError
+        return data
+
+    def _read(self, count: int) -> bytes:
+        try:
+            return self.file.read(count)
+        except OSError as error:
+            raise LogError(
+                f"{self.path}: expected {self.size} readable bytes, found: {error.strerror} behind byte {self.at}; "
+                "copy what can be read elsewhere"
+            ) from error
+
+    def _peeked(self) -> bytes:
+        self.file.seek(self.at)
+        head = self._read(4)
+        self.file.seek(self.at)
+        return head
+
+    def _skip(self) -> None:
+        """Step over a frame that is no data."""
+        self.file.seek(self.at + 4)
+        stop = self.at + 8 + int.from_bytes(self._read(4), "little")
+        if stop > self.size:
+            self._stop("the file ends inside a frame that holds no data; what stood behind is lost")
+        else:
+            self.at = stop
+
+    def _stop(self, reason: str) -> None:
+        """Note damage up to the end of the file, and go there."""
+        self.damage.append(Damage(self.path, self.at, self.size, reason))
+        self.at = self.size
+
+
+def _lz4() -> Callable[[bytes], bytes]:
+    import lz4.frame
+
+    return lz4.frame.LZ4FrameDecompressor().decompress  # type: ignore[no-any-return]

@@ -1,0 +1,223 @@
+"""MCAP files as batches of message payloads, however they were written and whatever happened to them.
+
+The survey of a file says where its messages stand. Chunks whose message indexes name no wanted channel are not opened;
+the others are read, decompressed and handed on by several threads, in the file's order. What a message index gets wrong
+is found by walking over the chunk's records; what it leaves out only the file's statistics tell, so that without them,
+as in a file that is cut, all chunks are walked over. What cannot be read is noted as `Damage`.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Generic, Self, TypeVar
+
+import numpy as np
+
+from navirl_cli.logs.container import records
+from navirl_cli.logs.container.batches import Batch, Channel, Damage, Definitions
+from navirl_cli.logs.container.chunks import Piece, Unpacked
+from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.opener import Opener, Wanted
+from navirl_cli.logs.container.raw import RawFile
+from navirl_cli.logs.container.records import HEAD_SIZE, IntArray
+from navirl_cli.logs.container.summary import Summary, read_footer, read_header, read_summary
+from navirl_cli.logs.container.survey import Survey
+from navirl_cli.parallel import cores
+
+#: More threads than this wait for each other and for the memory.
+_MAX_THREADS: Final = 4
+_KEPT_BYTES: Final = 1 << 24
+
+T = TypeVar("T")
+
+
+def threads_here() -> int:
+    """How many threads reading uses."""
+    return min(cores(), _MAX_THREADS)
+
+
+@dataclass
+class _Job(Generic[T]):
+    """A piece that is being opened."""
+
+    piece: Piece
+    #: What it holds, and the results where message indexes served.
+    outcome: "Future[tuple[Unpacked, list[T] | None]]"
+
+
+class LogFile:
+    """An open MCAP file; a context manager.
+
+    Args:
+        path: The file, or one that is open, which stays so.
+        trust_indexes: False to walk over every chunk, whatever message indexes say.
+
+    Raises:
+        LogError: It is no MCAP file, or ends before its header does.
+    """
+
+    def __init__(self, path: Path | str | Opened, *, trust_indexes: bool = True) -> None:
+        self._opened = opened = path if isinstance(path, Opened) else open_log(Path(path))
+        self.path, self._file, self.size = opened.path, opened.file, opened.size
+        self._keeps_open = opened is path
+        #: Bytes walked over so far.
+        self.position = 0
+        self._raw = RawFile(self._file, self.size)
+        with ExitStack() as on_failure:
+            on_failure.callback(self._close)
+            self.profile, self.library, data_start = read_header(self.path, self._file, self.size)
+            footer = read_footer(self._file, self.size)
+            #: The summary section, None if there is none or it is damaged.
+            self.summary = footer and read_summary(self._file, self.size, data_start, footer)
+            on_failure.pop_all()
+        summary = self.summary or Summary()
+        self._survey = Survey(
+            self.path,
+            self._raw,
+            data_start,
+            summary.chunks,
+            footer,
+            self._channels_so_far,
+            summary_lost=bool(footer and footer.summary_start and self.summary is None),
+        )
+        self._survey.damage.extend(opened.damage)
+        self._opener = Opener(
+            self._raw,
+            self._survey,
+            Definitions(dict(summary.schemas), dict(summary.channels)),
+            sure=bool(footer and footer.summary_crc),
+            counted=summary.statistics is not None,
+            trust_indexes=trust_indexes,
+        )
+        #: Pieces that the survey has met and that are being opened.
+        self._jobs: deque[_Job[Any]] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        if not self._keeps_open:
+            self._file.close()
+
+    @property
+    def damage(self) -> list[Damage]:
+        """What could not be read so far, in the file's order: chunks are opened behind the survey."""
+        return sorted(dict.fromkeys(self._survey.damage), key=lambda damage: damage.start)
+
+    @property
+    def lost(self) -> Mapping[int, int]:
+        """Messages by channel that stood in chunks which cannot be used, as their indexes count them."""
+        return self._opener.lost
+
+    @property
+    def metadata(self) -> list[tuple[str, dict[str, str]]]:
+        """Metadata records met so far, in the file's order."""
+        return self._survey.metadata
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels known so far: all of them after a walk, or at once with a complete summary."""
+        definitions = self._opener.definitions
+        return tuple(definitions.channel(number) for number in sorted(definitions.channels))
+
+    def batches(self, wanted: Wanted) -> Iterator[Batch]:
+        """Walk over the file; once, since it collects damage and metadata.
+
+        Args:
+            wanted: Says which channels' messages are wanted.
+
+        Yields:
+            Their messages, piece by piece in the file's order.
+        """
+        return self.results(wanted, lambda batch: batch, threads=1)
+
+    def results(self, wanted: Wanted, use: Callable[[Batch], T], threads: int) -> Iterator[T]:
+        """Walk over the file, and use its messages by several threads; once, as :meth:`batches`.
+
+        Args:
+            wanted: Says which channels' messages are wanted.
+            use: What is done with each batch, in any thread.
+            threads: How many open chunks at once.
+
+        Yields:
+            What came out, in the file's order.
+        """
+        # once a block of this size was freed, glibc keeps smaller ones in place of giving them back chunk by chunk
+        np.empty(_KEPT_BYTES, dtype=np.uint8)
+        with ThreadPoolExecutor(threads) as pool:
+            jobs: deque[_Job[T]] = self._jobs
+            for piece in self._survey.pieces():
+                mine = self._opener.wanted_in(piece, wanted)
+                if mine == ():
+                    self._opener.pass_by(piece)
+                    continue
+                jobs.append(_Job(piece, pool.submit(self._opener.open, piece, mine, use)))
+                if len(jobs) > threads:
+                    yield from self._finished(jobs.popleft(), wanted, use)
+            while jobs:
+                yield from self._finished(jobs.popleft(), wanted, use)
+        self.position = self.size
+        self._survey.check_data()
+
+    def times(self) -> dict[int, IntArray]:
+        """Times of receipt in ns of all messages by channel, ascending, from message indexes where they can be used."""
+        found = self._times()
+        promised = self.summary.statistics.by_channel if self.summary and self.summary.statistics else {}
+        if self._opener.by_index and any(len(found.get(number, ())) < count for number, count in promised.items()):
+            with LogFile(self._opened, trust_indexes=False) as again:
+                found = again.times()
+            self._survey, self._opener = again._survey, again._opener
+        return found
+
+    def _times(self) -> dict[int, IntArray]:
+        found: dict[int, list[IntArray]] = {}
+        for piece in self._survey.pieces():
+            times = self._opener.times(piece)
+            if times is None:
+                unpacked, _ = self._opener.open(piece, None, lambda batch: batch)
+                for batch in self._opener.batches(piece, unpacked, lambda _: True):
+                    found.setdefault(batch.channel.id, []).append(batch.log_time_ns)
+            else:
+                self._opener.pass_by(piece)
+                for number, some in times.items():
+                    found.setdefault(number, []).append(some)
+        joined = {number: np.sort(np.concatenate(times)) for number, times in found.items()}
+        return {number: times for number, times in joined.items() if len(times)}
+
+    def _finished(self, job: _Job[T], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
+        """The results of a piece, in turn."""
+        unpacked, results = job.outcome.result()
+        self.position = job.piece.stop
+        if results is None:
+            yield from map(use, self._opener.batches(job.piece, unpacked, wanted))
+        else:
+            self._opener.pass_by(job.piece)
+            yield from results
+
+    def _channels_so_far(self) -> AbstractSet[int]:
+        """Ids of the channels that are defined before the place where the survey is, which is ahead."""
+        for job in self._jobs:
+            unpacked, results = job.outcome.result()
+            if results is None:
+                self._opener.define(job.piece, unpacked)
+        return self._opener.definitions.channels.keys()
+
+    def metadata_at(self, offset: int) -> tuple[str, dict[str, str]] | None:
+        """The metadata record at an offset of the file, None if there is none."""
+        head = self._raw.read(offset, offset + HEAD_SIZE)
+        try:
+            code, length = records.RECORD_HEAD.unpack_from(head)
+            content = self._raw.read(offset + HEAD_SIZE, min(self.size, offset + HEAD_SIZE + length))
+            return records.parse_metadata(content) if code == records.METADATA else None
+        except records.MALFORMED:
+            return None

@@ -1,0 +1,178 @@
+"""The header of an MCAP file, and the summary section at the end of a complete one."""
+
+import zlib
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from navirl_cli.errors import LogError
+from navirl_cli.logs.container import records
+from navirl_cli.logs.container.raw import RawFile
+from navirl_cli.logs.container.records import ChannelRecord, ChunkIndex, Footer, SchemaRecord, Statistics
+
+#: What the summary section starts with.
+_SUMMARY: Final = frozenset(
+    {
+        records.SCHEMA,
+        records.CHANNEL,
+        records.CHUNK_INDEX,
+        records.ATTACHMENT_INDEX,
+        records.STATISTICS,
+        records.METADATA_INDEX,
+        records.SUMMARY_OFFSET,
+        records.FOOTER,
+    }
+)
+_DATA_END_SIZE: Final = 4
+_FOOTER_SIZE: Final = 20
+
+
+@dataclass
+class Summary:
+    """What a sound summary section says; empty where it says nothing."""
+
+    schemas: dict[int, SchemaRecord] = field(default_factory=dict)
+    channels: dict[int, ChannelRecord] = field(default_factory=dict)
+    chunks: dict[int, ChunkIndex] = field(default_factory=dict)
+    metadata_offsets: list[int] = field(default_factory=list)
+    statistics: Statistics | None = None
+
+    def add(self, code: int, content: bytes) -> None:
+        """Take up one record of the section.
+
+        Raises:
+            struct.error, ValueError: The contents are no such record (`records.MALFORMED`).
+        """
+        if code == records.SCHEMA:
+            schema = records.parse_schema(content)
+            self.schemas[schema.id] = schema
+        elif code == records.CHANNEL:
+            channel = records.parse_channel(content)
+            self.channels[channel.id] = channel
+        elif code == records.CHUNK_INDEX:
+            chunk = records.parse_chunk_index(content)
+            self.chunks[chunk.start] = chunk
+        elif code == records.METADATA_INDEX:
+            self.metadata_offsets.append(records.parse_metadata_index(content))
+        elif code == records.STATISTICS:
+            statistics = records.parse_statistics(content)
+            # where counts by channel are left out, or do not add up, nothing can be told from them
+            if sum(statistics.by_channel.values()) == statistics.messages:
+                self.statistics = statistics
+
+
+def read_header(path: Path, file: BinaryIO, size: int) -> tuple[str, str, int]:
+    """Profile, library and the first byte behind the header.
+
+    Args:
+        path: The file's name, for messages.
+        file: A file that starts with MCAP's magic.
+        size: Its size in bytes.
+
+    Raises:
+        LogError: No header stands behind the magic.
+    """
+    start = len(records.MAGIC) + records.HEAD_SIZE
+    file.seek(0)
+    head = file.read(start)
+    code, length = records.RECORD_HEAD.unpack_from(head.ljust(start, b"\0"), len(records.MAGIC))
+    if len(head) >= start and code != records.HEADER:
+        raise LogError(
+            f"{path}: expected a header record after the magic, found record code {code:#04x}; "
+            "the file is damaged: copy it again"
+        )
+    if len(head) < start or start + length > size:
+        raise LogError(
+            f"{path}: expected a header record after the magic, found the end of the file after "
+            f"{size} bytes; nothing was recorded: record or copy it again"
+        )
+    try:
+        return *records.parse_header(file.read(length)), start + length
+    except records.MALFORMED as error:
+        raise LogError(
+            f"{path}: expected a header record after the magic, found one that does not parse ({error}); "
+            "the file is damaged: copy it again"
+        ) from error
+
+
+def read_footer(file: BinaryIO, size: int) -> Footer | None:
+    """The footer of a file that ends as it should.
+
+    Args:
+        file: An MCAP file.
+        size: Its size in bytes.
+
+    Returns:
+        The footer, or None where the file ends otherwise: its recorder was stopped, or its end was lost.
+    """
+    file.seek(max(0, size - records.TAIL_SIZE))
+    tail = file.read(records.TAIL_SIZE)
+    if len(tail) < records.TAIL_SIZE or not tail.endswith(records.MAGIC):
+        return None
+    code, length = records.RECORD_HEAD.unpack_from(tail)
+    if code != records.FOOTER or length != _FOOTER_SIZE:
+        return None
+    return records.parse_footer(tail[records.HEAD_SIZE : records.HEAD_SIZE + _FOOTER_SIZE])
+
+
+def read_summary(file: BinaryIO, size: int, data_start: int, footer: Footer) -> Summary | None:
+    """Read the summary section if it is there and sound.
+
+    Args:
+        file: An MCAP file.
+        size: Its size in bytes.
+        data_start: First byte behind the header.
+        footer: The file's footer.
+
+    Returns:
+        The summary, or None if there is none, its CRC is wrong, a record does not parse, or chunks stand outside of the
+        data or in each other.
+    """
+    end = size - records.TAIL_SIZE
+    if not data_start <= footer.summary_start <= end:
+        return None
+    file.seek(footer.summary_start)
+    data = file.read(end - footer.summary_start + records.HEAD_SIZE + 16)
+    if footer.summary_crc and zlib.crc32(data) != footer.summary_crc:
+        return None
+    summary = Summary()
+    at, stop = 0, end - footer.summary_start
+    try:
+        while at < stop:
+            code, length = records.RECORD_HEAD.unpack_from(data, at)
+            at += records.HEAD_SIZE + length
+            if at > stop:
+                return None
+            summary.add(code, data[at - length : at])
+    except records.MALFORMED:
+        return None
+    # a channel is of no use without its schema, which stands in a chunk
+    for number, channel in list(summary.channels.items()):
+        if channel.schema_id and channel.schema_id not in summary.schemas:
+            del summary.channels[number]
+    # each chunk stands in the data section, behind the one before
+    starts = [*sorted(summary.chunks), footer.summary_start]
+    fits = all(start < summary.chunks[start].stop <= following for start, following in pairwise(starts))
+    return summary if fits and starts[0] >= data_start else None
+
+
+def ends_data(raw: RawFile, footer: Footer | None, at: int) -> bool:
+    """Whether the record that starts at a byte ends the data section: damage can look like one.
+
+    Args:
+        raw: The file's bytes.
+        footer: None where the file does not end as it should.
+        at: The byte.
+    """
+    code, length = records.RECORD_HEAD.unpack(raw.peek(at, at + records.HEAD_SIZE))
+    stop = at + records.HEAD_SIZE + length
+    if footer is not None:
+        tail = raw.size - records.TAIL_SIZE
+        return (code == records.FOOTER and at == tail) or (
+            code == records.DATA_END and stop == (footer.summary_start or tail)
+        )
+    if code == records.DATA_END and length == _DATA_END_SIZE:
+        behind = raw.peek(stop, stop + 1)
+        return not behind or behind[0] in _SUMMARY
+    return bool(code == records.FOOTER and length == _FOOTER_SIZE)

@@ -1,0 +1,1 @@
+"""Message definitions: schema -> layout -> columns; reading and writing of messages."""

@@ -1,0 +1,230 @@
+"""Where the fields of a CDR message stand, derived from its definition and one message's bytes.
+
+CDR aligns each primitive to its size, counted from behind the four bytes of encapsulation; a string is its length with
+the closing NUL (uint32), then its bytes; a sequence is its count (uint32), then its items. ROS 1 has no encapsulation,
+aligns nothing and closes no string. Two messages of one type have the same layout if they agree in every such length:
+those are the layout's `checks`.
+
+Source: OMG CORBA 3.0, chapter 15.3 (CDR transfer syntax); DDSI-RTPS 2.2, chapter 10 (encapsulation); https://wiki.ros.org/msg
+(ROS 1).
+"""
+
+import struct
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc
+
+from navirl_cli.logs.messages.schema import PRIMITIVES, TIMES, Schema
+
+#: Bytes of encapsulation before a CDR message, and the first two of them, as uint16, by their byte order.
+ENCAPSULATION_SIZE: Final = 4
+_ENCAPSULATIONS: Final = {b"\0\1": ("<", 0x0100), b"\0\0": (">", 0x0000)}
+#: Some writers pad a payload to a multiple of four bytes.
+_MAX_PADDING: Final = 3
+#: Messages of more fields, those in sequences counted, are decoded one by one.
+_MAX_FIELDS: Final = 20_000
+
+#: numpy's type of a field; as text, "(3,)f8", numpy would parse it with `ast`, which threads must not share.
+Format = str | tuple[str, tuple[int]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout that messages of one size and the same lengths share."""
+
+    #: Structured type over the whole payload: a field for each wanted path ("path/sec" and "path/nanosec" of a time),
+    #: for each entry of a path in a sequence ("path#0", "path#1", ...), "#0", "#1", ... for the checks, and "~0", "~1",
+    #: ... for `texts`.
+    dtype: np.dtype[np.void]
+    #: The value each check must have, by its name in `dtype`.
+    checks: dict[str, int]
+    #: Number of entries of the sequences that wanted paths are in, by "path[]".
+    counts: dict[str, int]
+    #: Texts that are not wanted, and must be texts all the same.
+    texts: tuple[str, ...]
+
+    @cached_property
+    def head(self) -> np.dtype[np.void]:
+        """The same fields over as many bytes as they need, which are quicker to gather."""
+        names = self.dtype.names or ()
+        places = [self.dtype.fields[name][:2] for name in names] if self.dtype.fields else []
+        return np.dtype(
+            {
+                "names": list(names),
+                "formats": [kind for kind, _ in places],
+                "offsets": [at for _, at in places],
+                "itemsize": max((at + kind.itemsize for kind, at in places), default=0),
+            }
+        )
+
+
+class _UnfitError(Exception):
+    """The bytes are not what the definition says, or of a kind that is not walked."""
+
+
+@dataclass
+class _Walker:
+    """Walks over one payload along the definition and notes where things are."""
+
+    schema: Schema
+    payload: bytes
+    wanted: frozenset[str]
+    #: Sequences that wanted fields are in.
+    sequences: frozenset[str]
+    order: str
+    #: First byte of the message, from which alignment counts.
+    base: int
+    at: int
+    fields: dict[str, tuple[int, Format]] = field(default_factory=dict)
+    checks: list[tuple[int, str, int]] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    texts: list[tuple[int, Format]] = field(default_factory=list)
+    #: Entries met so far of each wanted field in a sequence.
+    entries: Counter[str] = field(default_factory=Counter)
+    steps: int = 0
+
+    @property
+    def cdr(self) -> bool:
+        return self.schema.encoding == "cdr"
+
+    def message(self, typename: str, prefix: str) -> None:
+        for name, desc in self.schema.fields(typename):
+            self.one(desc, prefix + name)
+
+    def one(self, desc: FieldDesc, path: str) -> None:
+        self.steps += 1
+        if self.steps > _MAX_FIELDS:
+            raise _UnfitError("too many fields")
+        if desc[0] == Nodetype.BASE:
+            self.primitive(desc[1][0], path)
+        elif desc[0] == Nodetype.NAME:
+            self.nested(desc[1], path)
+        elif desc[0] == Nodetype.ARRAY:
+            self.items(desc[1][0], desc[1][1], path)
+        else:
+            self.items(desc[1][0], self.length(minimum=0), path)
+
+    def nested(self, typename: str, path: str) -> None:
+        if typename in TIMES and path in self.wanted:
+            self.align(4)
+            name = self.entry(path)
+            self.fields[name + "/sec"] = (self.at, self.order + "i4")
+            self.fields[name + "/nanosec"] = (self.at + 4, self.order + "u4")
+        self.message(typename, path + ".")
+
+    def primitive(self, name: str, path: str) -> None:
+        if name != "string":
+            self.numbers(name, None, path)
+            return
+        closing = int(self.cdr)
+        size = self.length(minimum=closing)
+        place = (self.at, ("u1", (size - closing,)))
+        if path in self.wanted:
+            self.fields[self.entry(path)] = place
+        elif size > closing:
+            self.texts.append(place)
+        self.skip(size)
+        if closing:
+            self.checks.append((self.at - 1, "u1", 0))
+
+    def numbers(self, name: str, count: int | None, path: str) -> None:
+        if name not in PRIMITIVES:
+            raise _UnfitError(name)
+        if count == 0:
+            return
+        dtype = PRIMITIVES[name].replace("?", "u1").replace("<", self.order)
+        size = np.dtype(dtype).itemsize
+        self.align(size)
+        if count is not None:
+            for place in {path, f"{path}[]"} & self.wanted:
+                self.fields[place] = (self.at, (dtype, (count,)))
+        elif path in self.wanted:
+            self.fields[self.entry(path)] = (self.at, dtype)
+        self.skip(size * (1 if count is None else count))
+
+    def items(self, desc: FieldDesc, count: int, path: str) -> None:
+        if f"{path}[]" in self.sequences:
+            self.counts[f"{path}[]"] = count
+        if desc[0] == Nodetype.BASE and desc[1][0] != "string":
+            self.numbers(desc[1][0], count, path)
+            return
+        for _ in range(count):
+            self.one(desc, f"{path}[]")
+
+    def entry(self, path: str) -> str:
+        """The name of a field: that of an entry of a sequence has its number."""
+        if "[]" not in path:
+            return path
+        self.entries[path] += 1
+        return f"{path}#{self.entries[path] - 1}"
+
+    def length(self, minimum: int) -> int:
+        self.align(4)
+        if self.at + 4 > len(self.payload):
+            raise _UnfitError("a length behind the end")
+        (value,) = struct.unpack_from(self.order + "I", self.payload, self.at)
+        if value < minimum:
+            raise _UnfitError("a string without its closing NUL")
+        self.checks.append((self.at, self.order + "u4", value))
+        self.at += 4
+        return int(value)
+
+    def align(self, size: int) -> None:
+        if self.cdr:
+            self.at += -(self.at - self.base) % size
+
+    def skip(self, size: int) -> None:
+        self.at += size
+        if self.at > len(self.payload):
+            raise _UnfitError("a field behind the end")
+
+
+def derive(schema: Schema, payload: bytes, wanted: Iterable[str]) -> Layout | None:
+    """Derive the layout of a message.
+
+    Args:
+        schema: The message's type.
+        payload: The message, with its encapsulation where it has one.
+        wanted: Dotted fields that `Schema.leaf` knows.
+
+    Returns:
+        The layout, or None where the message is none of this type, or holds a type that only rosbags decodes: such
+        messages are to be decoded one by one.
+    """
+    order, base = "<", 0
+    checks: list[tuple[int, str, int]] = []
+    if schema.encoding == "cdr":
+        if (start := payload[:2]) not in _ENCAPSULATIONS:
+            return None
+        order, value = _ENCAPSULATIONS[start]
+        base = ENCAPSULATION_SIZE
+        checks.append((0, "<u2", value))
+    paths = frozenset(wanted)
+    sequences = frozenset(path.partition("[]")[0] + "[]" for path in paths if "[]" in path)
+    walker = _Walker(schema, payload, paths, sequences, order, base, base, checks=checks)
+    try:
+        walker.message(schema.name, "")
+    except _UnfitError:
+        return None
+    if not walker.at <= len(payload) <= walker.at + (_MAX_PADDING if schema.encoding == "cdr" else 0):
+        return None
+    # a terminator must be zero, a length must be the sample's
+    checked = {f"#{number}": (at, kind) for number, (at, kind, _) in enumerate(walker.checks)}
+    texts = {f"~{number}": place for number, place in enumerate(walker.texts)}
+    places: dict[str, tuple[int, Format]] = {**walker.fields, **checked, **texts}
+    dtype = np.dtype(
+        {
+            "names": list(places),
+            "formats": [kind for _, kind in places.values()],
+            "offsets": [at for at, _ in places.values()],
+            "itemsize": len(payload),
+        }
+    )
+    values = [value for _, _, value in walker.checks]
+    return Layout(dtype, dict(zip(checked, values, strict=True)), walker.counts, tuple(texts))

@@ -1,0 +1,1 @@
+"""Which topic is what, and what its columns mean: clocks, poses, people, maps, session."""

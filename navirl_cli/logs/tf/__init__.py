@@ -1,0 +1,1 @@
+"""Frames: transforms over time, and the tree that they make."""

@@ -1,0 +1,301 @@
+"""A report's page in a browser: it opens, sorts, enlarges, prints, and can be read on a phone and in the dark."""
+
+import fcntl
+import json
+import os
+import re
+import select
+import shutil
+from base64 import b64decode
+from time import monotonic
+
+import pytest
+from PIL import Image
+
+from navirl_cli.documents.document import Bullets, Heading, Paragraph, Picture, Report, Table
+from navirl_cli.documents.page import to_html
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found; on Debian: apt-get install chromium")
+
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--hide-scrollbars",
+]
+
+
+def moved(fd):
+    """The same file under a number from 10 on, where it is not in the way of 3 and 4."""
+    copy = fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10)
+    os.close(fd)
+    return copy
+
+
+class Browser:
+    """Chromium and one page of it, driven through the DevTools protocol over pipes: its files 3 and 4."""
+
+    def __init__(self, profile):
+        commands, self.commands, self.answers, answers = map(moved, (*os.pipe(), *os.pipe()))
+        words = [CHROMIUM, *FLAGS, f"--user-data-dir={profile}", "--remote-debugging-pipe", "about:blank"]
+        files = [(os.POSIX_SPAWN_DUP2, commands, 3), (os.POSIX_SPAWN_DUP2, answers, 4)]
+        files += [(os.POSIX_SPAWN_OPEN, fd, os.devnull, os.O_RDWR, 0) for fd in (0, 1, 2)]
+        self.process = os.posix_spawn(CHROMIUM, words, os.environ, file_actions=files)
+        os.close(commands)
+        os.close(answers)
+        self.buffer, self.events, self.calls, self.session = b"", [], 0, {}
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = {"sessionId": self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]}
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def close(self):
+        os.close(self.commands)  # which ends it, whatever it is at
+        os.close(self.answers)
+        os.waitpid(self.process, 0)
+
+    def receive(self, until):
+        """The next message; what waits longer than the deadline has failed."""
+        while b"\0" not in self.buffer:
+            ready, _, _ = select.select([self.answers], [], [], max(0.0, until - monotonic()))
+            assert ready, "the browser does not answer"
+            piece = os.read(self.answers, 1 << 20)
+            assert piece, "the browser has ended"
+            self.buffer += piece
+        message, _, self.buffer = self.buffer.partition(b"\0")
+        return json.loads(message)
+
+    def call(self, method, **params):
+        self.calls += 1
+        message = {"id": self.calls, "method": method, "params": params, **self.session}
+        data = json.dumps(message).encode() + b"\0"
+        while data:
+            data = data[os.write(self.commands, data) :]
+        until = monotonic() + 20
+        while (answer := self.receive(until)).get("id") != self.calls:
+            self.events.append(answer)
+        assert "error" not in answer, (method, answer)
+        return answer["result"]
+
+    def wait_for(self, method):
+        until = monotonic() + 20
+        while not any(event["method"] == method for event in self.events):
+            self.events.append(self.receive(until))
+
+    def open(self, path):
+        self.events.clear()
+        self.call("Page.navigate", url=path.as_uri())
+        self.wait_for("Page.loadEventFired")
+
+    def run(self, script):
+        """The value of an expression in the page, promises awaited."""
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def show(self, *, width=1280, height=900, scheme="light"):
+        """A window of that size in CSS pixels."""
+        phone = width < 600
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def click(self, selector):
+        script = f"""(() => {{ const element = document.querySelector({json.dumps(selector)});
+            element.scrollIntoView({{block: "center"}}); const box = element.getBoundingClientRect();
+            return [box.x + box.width / 2, box.y + box.height / 2]; }})()"""
+        x, y = self.run(script)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def press(self, key, code, text=""):
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, text=text)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """A browser that has the page of a report open."""
+    folder = tmp_path_factory.mktemp("page")
+    Image.new("RGB", (1400, 800), "#0072B2").save(folder / "wide.png")
+    (folder / "line.svg").write_text(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='90' height='60'><path style='fill: red' d='M0 0H90V60z'/></svg>"
+    )
+    (folder / "report.html").write_text(to_html(report_with(folder)), encoding="utf-8")
+    browser = Browser(folder / "profile")
+    browser.path = folder / "report.html"
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(browser):
+    """The page as it opens on a desk."""
+    browser.show()
+    browser.open(browser.path)
+    return browser
+
+
+def report_with(folder):
+    values = (
+        ("b", "2.5 ± 0.5"),
+        ("a", "-"),
+        ("p10", "10 m"),
+        ("p9", "\N{MINUS SIGN}1"),
+        ("c", "not told"),
+        ("d", "n/a"),
+    )
+    values += (("e", "inf"), ("f", "2.25"))
+    wide = tuple(f"column{i}" for i in range(12))
+    return Report(
+        "What a `robot` learnt",
+        (
+            Paragraph(f"Some **strong** words, and a long one: {'x' * 300}."),
+            Heading("Numbers"),
+            Table(("who", "length"), values, "By participant."),
+            Table(("", *wide[1:]), (tuple("1234567.5" for _ in wide),) * 60, "Wide, and longer than a sheet."),
+            Table(("file", "hash"), (("`demos.json`", f"`{'0123456789abcdef' * 4}`"),)),
+            Heading("Figures of " + "n" * 31),
+            Bullets(("one", "two")),
+            Picture(folder / "wide.png", "A `wide` one.", "blue"),
+            Picture(folder / "line.svg", "A drawing."),
+        ),
+        "Made by a test.",
+    )
+
+
+def column(page, index):
+    return page.run(f"[...document.querySelector('tbody').rows].map(row => row.cells[{index}].textContent)")
+
+
+def sorted_as(page):
+    return page.run("[...document.querySelectorAll('thead')[0].rows[0].cells].map(cell => cell.ariaSort)")
+
+
+def complaints(page):
+    kinds = ("Log.entryAdded", "Runtime.consoleAPICalled", "Runtime.exceptionThrown")
+    return [event["params"] for event in page.events if event["method"] in kinds]
+
+
+def test_it_opens_from_a_file_without_a_word_or_a_request(page):
+    images = "[...document.querySelectorAll('figure img')]"
+    assert page.run(f"{images}.map(image => image.complete && image.naturalWidth)") == [1400, 90]
+    assert page.run("document.title") == "What a robot learnt"
+    assert complaints(page) == []
+    sent = [
+        event["params"]["request"]["url"] for event in page.events if event["method"] == "Network.requestWillBeSent"
+    ]
+    assert sent[0] == page.path.as_uri()
+    assert all(url.startswith("data:") for url in sent[1:])
+
+
+def test_it_is_not_let_into_the_network_and_runs_no_other_script(page):
+    refused = page.run("""new Promise(resolve => {
+        const refused = [];
+        document.addEventListener("securitypolicyviolation", event => {
+            refused.push(event.effectiveDirective);
+            if (refused.length === 3) resolve(refused.sort());
+        });
+        document.body.append(Object.assign(new Image(), {src: "http://127.0.0.1:9/x.png"}));
+        document.body.append(Object.assign(document.createElement("script"), {textContent: "globalThis.ran = 1"}));
+        fetch("http://127.0.0.1:9/").catch(() => {});
+    })""")
+    assert refused == ["connect-src", "img-src", "script-src-elem"]
+    assert page.run("globalThis.ran") is None
+    assert complaints(page) != []
+
+
+def test_a_click_sorts_numbers_before_words_and_what_is_missing_last(page):
+    assert sorted_as(page) == [None, None]
+    length = "table:first-of-type th:nth-child(2) button"
+    page.click(length)
+    assert column(page, 1) == ["\N{MINUS SIGN}1", "2.25", "2.5 ± 0.5", "10 m", "inf", "not told", "-", "n/a"]
+    assert sorted_as(page) == [None, "ascending"]
+    page.click(length)
+    assert column(page, 1) == ["inf", "10 m", "2.5 ± 0.5", "2.25", "\N{MINUS SIGN}1", "not told", "-", "n/a"]
+    assert column(page, 0) == ["e", "p10", "b", "f", "p9", "c", "a", "d"]
+    assert sorted_as(page) == [None, "descending"]
+    page.click(length)
+    assert column(page, 0) == ["b", "a", "p10", "p9", "c", "d", "e", "f"]
+    assert sorted_as(page) == [None, None]
+
+
+def test_a_key_sorts_too(page):
+    page.run("document.querySelector('thead button').focus()")
+    page.press("Enter", 13, "\r")
+    assert column(page, 0) == ["a", "b", "c", "d", "e", "f", "p9", "p10"]
+    page.press(" ", 32, " ")
+    assert column(page, 0) == ["p10", "p9", "f", "e", "d", "c", "b", "a"]
+    assert sorted_as(page) == ["descending", None]
+
+
+def test_only_headers_with_a_name_and_something_to_sort_are_buttons(page):
+    buttons = "[...document.querySelectorAll('table')].map(table => table.querySelectorAll('button').length)"
+    assert page.run(buttons) == [2, 11, 0]
+
+
+def test_a_figure_is_enlarged_by_click_or_key_and_closed_again(page):
+    is_open = "document.querySelector('dialog').open"
+    width = "document.querySelector('{} img').getBoundingClientRect().width"
+    before = page.run(width.format("figure"))
+    page.click("figure img")
+    assert page.run(is_open)
+    assert page.run("document.querySelector('dialog img').alt") == "blue"
+    assert page.run(width.format("dialog")) > before
+    page.press("Escape", 27)
+    assert not page.run(is_open)
+    assert page.run("document.activeElement === document.querySelector('figure button.enlarge')")
+    page.press("Enter", 13, "\r")
+    assert page.run(is_open)
+    page.click("dialog img")
+    assert not page.run(is_open)
+
+
+@pytest.mark.parametrize("width", [360, 800])
+def test_only_wide_tables_scroll_sideways(page, width):
+    page.show(width=width, height=740)
+    assert page.run("[document.documentElement.scrollWidth, innerWidth]") == [width, width]
+    inside = "[...document.querySelectorAll('.scroll')].map(box => box.scrollWidth > box.clientWidth)"
+    assert page.run(inside)[:2] == [False, True]
+    if width == 360:
+        page.click("figure img")
+        assert page.run("document.querySelector('dialog').scrollWidth") == 2.5 * width
+
+
+CONTRASTS = """(() => {
+    const parse = text => (text.match(/[\\d.]+/g) ?? []).map(Number);
+    const linear = v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const light = ([r, g, b]) => 0.2126 * linear(r / 255) + 0.7152 * linear(g / 255) + 0.0722 * linear(b / 255);
+    const ground = element => {
+        const colour = parse(getComputedStyle(element).backgroundColor);
+        return colour[3] === 0 ? (element.parentElement ? ground(element.parentElement) : [255, 255, 255]) : colour;
+    };
+    const found = {};
+    for (const element of document.querySelectorAll("body *")) {
+        if (![...element.childNodes].some(node => node.nodeType === 3 && node.data.trim())) continue;
+        if (element.localName === "script") continue;
+        const pair = [light(parse(getComputedStyle(element).color)), light(ground(element))].sort((a, b) => b - a);
+        found[element.localName] = Math.min(found[element.localName] ?? 21, (pair[0] + 0.05) / (pair[1] + 0.05));
+    }
+    return {found, paper: light(ground(document.body)), card: ground(document.querySelector("figure img"))};
+})()"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_texts_stand_out_and_figures_stay_on_white(page, scheme):
+    page.show(scheme=scheme)
+    measured = page.run(CONTRASTS)
+    assert {"h1", "p", "a", "td", "th", "code", "button", "figcaption", "strong", "li"} <= set(measured["found"])
+    assert min(measured["found"].values()) >= 4.5, measured["found"]
+    assert (measured["paper"] < 0.05) == (scheme == "dark")
+    assert measured["card"] == [255, 255, 255]
+
+
+def test_it_prints_on_a4(page):
+    printed = b64decode(page.call("Page.printToPDF", preferCSSPageSize=True)["data"])
+    assert printed.startswith(b"%PDF")
+    sheets = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", printed)
+    assert len(sheets) >= 3
+    assert {(round(float(width)), round(float(height))) for width, height in sheets} == {(595, 842)}
