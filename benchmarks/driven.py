@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import factories as make
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit

@@ -18,11 +18,12 @@ from pathlib import Path
 import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from log_factory import START_NS, build, cdr, definition, header, odometry, vector, wrench
+
+from navirl_cli.arrays import FloatArray
 
 SEED = 4
 #: Bytes lost from the end of the second log: with footer and magic the way to the summary is gone.
@@ -38,7 +39,6 @@ TYPES = {
 }
 _COMPRESSION = {"": CompressionType.NONE, "zstd": CompressionType.ZSTD}
 
-FloatArray = NDArray[np.float64]
 #: Messages of one topic in order: time of receipt in ns, topic, payload.
 Stream = Iterator[tuple[int, str, bytes]]
 

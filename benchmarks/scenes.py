@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from navirl_cli.arrays import BoolArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import BoolArray, Grid
+from navirl_cli.demos.grid import Grid
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 

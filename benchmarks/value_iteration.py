@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 

@@ -11,11 +11,10 @@ from itertools import pairwise
 from math import ceil, exp, floor, hypot, inf, log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from navirl_cli.arrays import BoolArray, FloatArray
+
 Cell = tuple[int, int]
 
 #: (dx, dy) of the eight moves, counter-clockwise from +x.

@@ -8,7 +8,7 @@ import navirl_cli
 PACKAGE = Path(navirl_cli.__file__).parent
 #: From the bottom up; rooms of one line do not know each other.
 ORDER = [
-    ["__init__", "errors"],
+    ["__init__", "arrays", "errors"],
     ["files", "parallel", "documents"],
     ["logs"],
     ["demos"],

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
 from navirl_cli.artefacts.store import Input, number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import ArtefactError, NavirlError
 from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.fit import Fit

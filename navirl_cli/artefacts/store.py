@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from navirl_cli import __version__
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import replacing
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 
 #: Length of the stretches whose steadiness is judged, s.
 STRETCH_S = 0.25

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.contact import Pushes, PushSettings, missing_s
-from navirl_cli.demos.grid import OCCUPIED_FROM, FloatArray, Grid, IntArray, is_costmap
+from navirl_cli.demos.grid import OCCUPIED_FROM, Grid, is_costmap
 from navirl_cli.demos.lines import path_length_m, thinned
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Trial
 from navirl_cli.errors import DemonstrationError

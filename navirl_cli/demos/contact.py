@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.bias import bias_of
 from navirl_cli.demos.demonstration import Contact
-from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.errors import LogError
 from navirl_cli.logs.recording import Recording
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

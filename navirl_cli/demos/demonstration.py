@@ -5,7 +5,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
 
 

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.checks import (
     check_cells,
     check_gaps,
@@ -20,7 +21,7 @@ from navirl_cli.demos.checks import (
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
+from navirl_cli.demos.grid import Grid, grid_from_occupancy
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, trials_of

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.contact import Pushes
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.logs.recording import Recording
 
 #: Everything is put on a clock of this step, s; every so many steps are a sample.

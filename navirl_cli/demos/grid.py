@@ -7,11 +7,8 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import GridError
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 #: Displacements (dx, dy) in cells of the eight moves, in a fixed order that every array "by move" follows.
 MOVES: IntArray = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.int64)

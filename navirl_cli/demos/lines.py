@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 
 def path_length_m(line_m: FloatArray) -> float:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import PersonTrack
-from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.logs.recording import Recording
 
 #: One who moves less than this stands still, m; beyond the other the mean place tells little of where they were.

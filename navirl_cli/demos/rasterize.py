@@ -9,8 +9,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.crossings import crossed_cells, grid_intersections, thinned_path
-from navirl_cli.demos.grid import MOVES, FloatArray, Grid, IntArray
+from navirl_cli.demos.grid import MOVES, Grid
 from navirl_cli.errors import DemonstrationError
 
 #: No path needs more steps than this many per cell that its line passes; a rule that still walks has lost the path.

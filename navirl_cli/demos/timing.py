@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.demos.lines import divided
 from navirl_cli.errors import DemonstrationError
 

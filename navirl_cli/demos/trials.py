@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.demos.grid import BoolArray, FloatArray, IntArray
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.logs.recording import Recording
 

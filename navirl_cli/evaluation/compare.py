@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, draw
 from navirl_cli.evaluation.metrics import METRICS, Values, line_values

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.evaluation.policy_paths import Steps
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import SampledPaths, sample_paths

@@ -7,7 +7,7 @@ from math import exp, log, pi, sqrt
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.reward import Reward
 
 #: Draws from the estimate's normal distribution, for intervals.

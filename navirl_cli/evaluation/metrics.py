@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.lines import divided, path_length_m, thinned
 from navirl_cli.evaluation.segments import ZONES, segments
 

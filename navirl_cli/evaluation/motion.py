@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.evaluation.segments import ZONES
 
 #: Positions are resampled at this rate, Hz, and smoothed by cubics over so many samples (1.1 s): derivatives of noisy

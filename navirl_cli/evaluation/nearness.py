@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.paths import SampledPaths
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 LEVEL = 0.95
 RESAMPLES = 9999

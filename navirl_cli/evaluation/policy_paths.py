@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import MOVES, FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.grid import MOVES
 from navirl_cli.evaluation.metrics import areas_m2
 from navirl_cli.evaluation.segments import ZONES, Segments, segments
 from navirl_cli.irl.lattice import Lattice

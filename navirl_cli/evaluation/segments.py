@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 #: Zones around a person (Hall, The Hidden Dimension, 1966): name, and the distance up to which they reach, m.
 ZONES: tuple[tuple[str, float], ...] = (

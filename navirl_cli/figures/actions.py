@@ -12,7 +12,8 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.quiver import Quiver
 
-from navirl_cli.demos.grid import MOVES, FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.grid import MOVES
 from navirl_cli.figures.cells import CellOptions, draw_bar, draw_over, scene_window, shown_states
 from navirl_cli.figures.ground import Window
 from navirl_cli.figures.marks import Marks

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.text import Annotation
 from matplotlib.textpath import text_to_path
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.sheet import common_legend
 from navirl_cli.figures.style import INK, house_style, level_colours, panel_width_in

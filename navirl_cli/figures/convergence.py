@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.figures.profile import SYMBOLS
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style
 from navirl_cli.irl.terms.term import Parameter

@@ -12,8 +12,8 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.quiver import Quiver
 from matplotlib.text import Annotation
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Contact, Demonstration
-from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import group_of
 from navirl_cli.figures.ground import Window, cropped_to, window_around

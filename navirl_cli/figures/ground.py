@@ -12,7 +12,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.image import AxesImage
 from matplotlib.textpath import text_to_path
 
-from navirl_cli.demos.grid import BoolArray, FloatArray, Grid
+from navirl_cli.arrays import BoolArray, FloatArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.figures.style import look, panel_width_in
 

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.figures.ground import Window, frame, inside
 from navirl_cli.figures.scale import draw_scale_bar

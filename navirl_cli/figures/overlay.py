@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.figures.style import colour_of, look
 

@@ -11,8 +11,9 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Contact, Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import by_group
 from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, legend_below, window_around

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import SceneError
 from navirl_cli.figures.cells import EXTEND, DrawnCells, draw_policy, draw_reward
 from navirl_cli.figures.ground import Window

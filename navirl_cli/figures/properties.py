@@ -14,7 +14,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ground import legend_below
 from navirl_cli.figures.style import colour_of, house_style, look

@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.quiver import Quiver
 from matplotlib.text import Annotation
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.figures.ground import Window, inside
 from navirl_cli.figures.style import look, panel_width_in
 

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.ticker import MaxNLocator
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
 

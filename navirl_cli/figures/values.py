@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.contour import QuadContourSet
 from matplotlib.ticker import MaxNLocator
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.figures.cells import (
     CellOptions,
     DrawnCells,

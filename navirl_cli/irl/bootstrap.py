@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit

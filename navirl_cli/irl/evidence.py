@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import MOVES, IntArray
+from navirl_cli.demos.grid import MOVES
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.scene import Scene, scenes_of
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import MOVES, FloatArray, Grid, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.grid import MOVES, Grid
 from navirl_cli.errors import SceneError
 
 #: The move that undoes each of MOVES.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 MAX_ITERATIONS = 200
 #: The Newton step promises less than this gain, in nats: the optimum is reached for every purpose.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.likelihood import likelihood, value_and_gradient
 from navirl_cli.irl.newton import Point

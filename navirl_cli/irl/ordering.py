@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.irl.lattice import OPPOSITE, Lattice
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.values import Policy
 

@@ -8,7 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit

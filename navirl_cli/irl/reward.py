@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.deviation import Deviation

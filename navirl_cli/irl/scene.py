@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import SceneError
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.ordering import Ordering
 

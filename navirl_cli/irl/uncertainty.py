@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 #: Information, in squared units of a parameter's scale, below which nothing is said: an error of 1000 scales.
 NO_INFORMATION = 1e-6

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood

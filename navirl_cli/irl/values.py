@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.irl.lattice import OPPOSITE, Lattice
 from navirl_cli.irl.ordering import Ordering
 from navirl_cli.irl.series import InfinitePartitionError, Splitting, ValueStatus

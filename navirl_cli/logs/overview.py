@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Damage
 from navirl_cli.logs.container.compressed import Opened, open_log
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
-from navirl_cli.logs.recording import IntArray
 from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
 from navirl_cli.logs.roles.topics import Choice, Topic, choices, is_missed, topics_of
 from navirl_cli.logs.sample import first_messages

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.errors import LogError
 
 #: Name of the metadata record in which a log says what only the experimenter knows. Keys: "participant", a name; in
@@ -16,9 +17,6 @@ SESSION_RECORD = "navirl.session"
 #: Name of the metadata record with cells that were published with the paths: key "cells", a JSON list of objects with
 #: "t_ns" (as above), "name" and "cells" (pairs column, row).
 PUBLISHED_RECORD = "navirl.published"
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from navirl_cli.demos.grid import INSCRIBED, LETHAL, FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.grid import INSCRIBED, LETHAL
 from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Occupancy
 from navirl_cli.published.participant import Participant, PublishedPath

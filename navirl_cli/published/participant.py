@@ -8,8 +8,9 @@ from typing import Any, Final, ParamSpec, TypeVar
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.demos.grid import FloatArray, Grid, IntArray, grid_from_occupancy
+from navirl_cli.demos.grid import Grid, grid_from_occupancy
 from navirl_cli.errors import ArtefactError
 from navirl_cli.logs.recording import Occupancy
 from navirl_cli.published.fields import occupancy_in, pairs_in, state_of

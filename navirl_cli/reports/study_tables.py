@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from statistics import median
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.documents.document import Table
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import Fit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 
 #: Length of a time step, s: the rate of the wrench.
 STEP_S = 0.01

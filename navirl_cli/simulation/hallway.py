@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.arrays import FloatArray
+from navirl_cli.demos.grid import Grid
 
 RESOLUTION_M = 0.1
 SIZE_M = (10.0, 5.0)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.demos.grid import FloatArray, IntArray
 from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import SESSION_RECORD
 from navirl_cli.simulation import protocol, sensors

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward

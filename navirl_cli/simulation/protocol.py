@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.demos.rasterize import rasterize
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from navirl_cli.demos.grid import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.simulation.driving import STEP_S
 
 #: Messages a second; the wrench comes with every step, at 100 Hz.

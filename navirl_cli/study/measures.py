@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import FloatArray
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, nominal_of, summary_of
 from navirl_cli.evaluation.metrics import Values, paper_values
 from navirl_cli.irl.scene import Scene, scenes_of

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from navirl_cli.demos.grid import IntArray
+from navirl_cli.arrays import IntArray
 from navirl_cli.errors import ArtefactError
 from navirl_cli.logs.yaml_file import brief
 

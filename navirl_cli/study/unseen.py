@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from navirl_cli.demos.grid import FloatArray, Grid
+from navirl_cli.arrays import FloatArray
+from navirl_cli.demos.grid import Grid
 from navirl_cli.irl.scene import Scene
 
 #: Two people stand at these shares of the nominal path, this far to its left and to its right, m.

@@ -14,8 +14,8 @@ from navirl_cli.commands.shared import Function, demonstrations_in, demos_argume
 from navirl_cli.errors import DemonstrationError
 
 if TYPE_CHECKING:
+    from navirl_cli.arrays import FloatArray
     from navirl_cli.demos.demonstration import Demonstration
-    from navirl_cli.demos.grid import FloatArray
     from navirl_cli.figures.cells import CellOptions
     from navirl_cli.figures.overlay import Overlay
     from navirl_cli.irl.reward import Reward

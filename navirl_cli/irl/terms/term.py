@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from navirl_cli.demos.grid import FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.scene import Scene
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
-from navirl_cli.logs.container.records import ChannelRecord, IntArray, SchemaRecord
+from navirl_cli.logs.container.records import ChannelRecord, SchemaRecord
 
 Buffer = bytes | memoryview
 

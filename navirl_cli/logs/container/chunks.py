@@ -8,9 +8,10 @@ from typing import Final
 
 import zstandard
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Buffer
-from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, Found, IntArray
+from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, Found
 
 #: A chunk that claims more is damaged: recorders write about 1 MB, and a wrong number must not fill the memory.
 MAX_CHUNK_BYTES: Final = 1 << 28

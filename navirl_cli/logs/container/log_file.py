@@ -18,13 +18,14 @@ from typing import Any, Final, Generic, Self, TypeVar
 
 import numpy as np
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Damage, Definitions
 from navirl_cli.logs.container.chunks import Piece, Unpacked
 from navirl_cli.logs.container.compressed import Opened, open_log
 from navirl_cli.logs.container.opener import Opener, Wanted
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.container.records import HEAD_SIZE, IntArray
+from navirl_cli.logs.container.records import HEAD_SIZE
 from navirl_cli.logs.container.summary import Summary, read_footer, read_header, read_summary
 from navirl_cli.logs.container.survey import Survey
 from navirl_cli.parallel import cores

@@ -6,11 +6,12 @@ from typing import Final, TypeVar
 
 import numpy as np
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Definitions, message_batch
 from navirl_cli.logs.container.chunks import Decompressor, Piece, Unpacked, indexes_of, open_chunk
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.container.records import Found, IntArray
+from navirl_cli.logs.container.records import Found
 from navirl_cli.logs.container.resync import walk_on
 from navirl_cli.logs.container.survey import Survey
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from navirl_cli.arrays import IntArray
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 
@@ -52,8 +53,6 @@ MESSAGE_HEAD: Final = np.dtype(
         "itemsize": MESSAGE_HEAD_SIZE,
     }
 )
-
-IntArray = NDArray[np.int64]
 
 
 class SchemaRecord(NamedTuple):

@@ -6,9 +6,10 @@ from typing import Final
 
 import numpy as np
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.chunks import COMPRESSIONS, MAX_CHUNK_BYTES
-from navirl_cli.logs.container.records import HEAD_SIZE, Found, IntArray
+from navirl_cli.logs.container.records import HEAD_SIZE, Found
 
 #: Bytes searched at once, first and at most: where there are many holes each is small.
 _FIRST, _BLOCK = 1 << 12, 1 << 20

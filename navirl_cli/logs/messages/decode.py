@@ -6,12 +6,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel, gathered
 from navirl_cli.logs.messages.layout import Layout, derive
 from navirl_cli.logs.messages.schema import AnySchema, DecodeError, JsonSchema, Leaf, Schema, value_at
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 Columns = dict[str, NDArray[Any]]
 
 #: Layouts derived for the messages of one size in a batch before the rest is decoded one by one.

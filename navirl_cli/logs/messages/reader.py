@@ -5,10 +5,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel, Damage
 from navirl_cli.logs.container.compressed import Opened
 from navirl_cli.logs.container.log_file import LogFile, threads_here
-from navirl_cli.logs.messages.decode import IntArray, Part
+from navirl_cli.logs.messages.decode import Part
 from navirl_cli.logs.messages.series import Collector, Series
 
 #: Called with the bytes done and the bytes of all files.

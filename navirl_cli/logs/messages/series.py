@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Channel
-from navirl_cli.logs.messages.decode import Columns, Decoder, IntArray, Part, empty_column
+from navirl_cli.logs.messages.decode import Columns, Decoder, Part, empty_column
 from navirl_cli.logs.messages.schema import Schema, SchemaError, parse_definition
 
 

@@ -10,11 +10,9 @@ from enum import StrEnum
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from navirl_cli.logs.recording import FloatArray, IntArray
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 
-BoolArray = NDArray[np.bool_]
 NS_PER_S = 1_000_000_000
 #: A clock that moves by more than this against the recorder's between two messages has jumped, s.
 JUMP_S = 1.0

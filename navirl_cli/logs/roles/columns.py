@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.logs.messages.series import Series
-from navirl_cli.logs.recording import FloatArray, IntArray
 from navirl_cli.logs.roles.clocks import Clock, Stamped
 from navirl_cli.logs.roles.message_types import Kind
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError
-from navirl_cli.logs.recording import FloatArray, IntArray
 from navirl_cli.logs.roles.clocks import Clock
 from navirl_cli.logs.roles.columns import Table
-from navirl_cli.logs.roles.plausible import PLACES, BoolArray, Limits, describe
+from navirl_cli.logs.roles.plausible import PLACES, Limits, describe
 from navirl_cli.logs.tf.tree import TransformTree
 
 #: Names of a robot's own frame, where no message says it.

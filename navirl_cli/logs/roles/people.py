@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.logs.recording import FloatArray, IntArray, Track
-from navirl_cli.logs.roles.columns import BoolArray, Table
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.logs.recording import Track
+from navirl_cli.logs.roles.columns import Table
 from navirl_cli.logs.roles.context import Setting
 
 #: visualization_msgs/Marker: cubes, spheres, cylinders and meshes stand for bodies; lines, arrows and texts do not.

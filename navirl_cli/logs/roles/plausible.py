@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from navirl_cli.logs.recording import FloatArray
+from navirl_cli.arrays import BoolArray, FloatArray
 
-BoolArray = NDArray[np.bool_]
 #: Measurements judged at once, so that the memory holds no copies of a whole log.
 _BLOCK: Final = 1 << 15
 #: A number this small between two that are not comes from a flipped exponent.

@@ -5,12 +5,13 @@ from typing import Final
 
 import numpy as np
 
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.recording import FloatArray, IntArray, Jump
+from navirl_cli.logs.recording import Jump
 from navirl_cli.logs.roles.clocks import NS_PER_S, in_order
 from navirl_cli.logs.roles.columns import Table
 from navirl_cli.logs.roles.context import Setting
-from navirl_cli.logs.roles.plausible import PLACES, BoolArray, sound_rotations
+from navirl_cli.logs.roles.plausible import PLACES, sound_rotations
 
 #: tf that is silent for longer is not bridged, ns.
 HOLE_NS: Final = 5 * NS_PER_S

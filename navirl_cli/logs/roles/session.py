@@ -8,9 +8,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import LogError
 from navirl_cli.logs.messages.reader import Contents
-from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Declared, FloatArray, Published, Session
+from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Declared, Published, Session
 
 Value = TypeVar("Value")
 

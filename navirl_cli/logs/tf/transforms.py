@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 #: First and last time, ns.
 Span = tuple[int, int]
 

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from navirl_cli.arrays import IntArray
 from navirl_cli.errors import FrameError
 from navirl_cli.logs.tf.kinship import covers as covers_of
 from navirl_cli.logs.tf.kinship import parents_first, reached
-from navirl_cli.logs.tf.transforms import ALWAYS, Curve, IntArray, Link, Span, Steps, Transforms, Way, beyond, in_force
+from navirl_cli.logs.tf.transforms import ALWAYS, Curve, Link, Span, Steps, Transforms, Way, beyond, in_force
 
 #: How far outside of its stamps a moving transform is held constant, in ns: a few periods of a slow localisation.
 HOLD_NS: Final = 1_000_000_000
