@@ -35,3 +35,9 @@ class RewardError(NavirlError):
 
 class ArtefactError(NavirlError):
     """A file that navirl reads or writes is missing, exists already or breaks its schema."""
+
+
+def brief(value: object) -> str:
+    """A value as a message shows it: on one line, and not longer than a line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -3,62 +3,95 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 import navirl_cli
 
 PACKAGE = Path(navirl_cli.__file__).parent
-#: From the bottom up; rooms of one line do not know each other.
-ORDER = [
-    ["__init__", "arrays", "errors"],
-    ["files", "parallel", "documents"],
-    ["logs"],
-    ["demos"],
-    ["irl"],
-    ["evaluation"],
-    ["study", "simulation", "published"],
-    ["artefacts"],
-    ["reports"],
-    ["figures"],
-    ["commands"],
-    ["cli"],
-    ["__main__"],
-]
-LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
+#: By folder, from the bottom up; rooms of one line do not know each other.
+ORDERS = {
+    "navirl_cli": [
+        ["__init__", "arrays", "errors"],
+        ["files", "parallel", "documents"],
+        ["logs"],
+        ["demos"],
+        ["irl"],
+        ["evaluation"],
+        ["study", "simulation", "published"],
+        ["artefacts"],
+        ["reports"],
+        ["figures"],
+        ["commands"],
+        ["cli"],
+        ["__main__"],
+    ],
+    "navirl_cli.logs": [
+        ["__init__", "recording", "yaml_file"],
+        ["container", "tf"],
+        ["messages", "sources", "map_file"],
+        ["roles"],
+        ["load", "overview"],
+    ],
+}
 
 
-def room_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+def level(order: list[list[str]]) -> dict[str, int]:
+    return {room: number for number, rooms in enumerate(order) for room in rooms}
 
 
-def imported_rooms(tree: ast.AST) -> set[str]:
+def folder_of(package: str) -> Path:
+    return PACKAGE.joinpath(*package.split(".")[1:])
+
+
+def room_of(path: Path, package: str = "navirl_cli") -> str:
+    return path.relative_to(folder_of(package)).parts[0].removesuffix(".py")
+
+
+def imported_rooms(tree: ast.AST, package: str = "navirl_cli") -> set[str]:
+    """The rooms of a package that a file imports from."""
     names = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "navirl_cli":
-            if node.module == "navirl_cli":
-                names |= {alias.name if (PACKAGE / f"{alias.name}.py").exists() else "__init__" for alias in node.names}
-            else:
-                names.add(node.module.split(".")[1])
+        if isinstance(node, ast.ImportFrom) and node.module == package:
+            folder = folder_of(package)
+            for alias in node.names:
+                found = (folder / f"{alias.name}.py").exists() or (folder / alias.name).is_dir()
+                names.add(alias.name if found else "__init__")
+        elif isinstance(node, ast.ImportFrom) and node.module and node.module.startswith(f"{package}."):
+            names.add(node.module.removeprefix(f"{package}.").split(".")[0])
         elif isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("navirl_cli.")}
+            names |= {
+                alias.name.removeprefix(f"{package}.").split(".")[0]
+                for alias in node.names
+                if alias.name.startswith(f"{package}.")
+            }
     return names
 
 
-def test_every_room_has_its_place():
-    assert {room_of(path) for path in PACKAGE.rglob("*.py")} == set(LEVEL)
+@pytest.mark.parametrize("package", ORDERS)
+def test_every_room_has_its_place(package):
+    assert {room_of(path, package) for path in folder_of(package).rglob("*.py")} == set(level(ORDERS[package]))
 
 
-def test_rooms_import_only_from_below():
+@pytest.mark.parametrize("package", ORDERS)
+def test_rooms_import_only_from_below(package):
+    levels = level(ORDERS[package])
     wrong = [
         f"{path.relative_to(PACKAGE)} imports {other}"
-        for path in PACKAGE.rglob("*.py")
-        for other in imported_rooms(ast.parse(path.read_text(encoding="utf-8")))
-        if other != room_of(path) and LEVEL[other] >= LEVEL[room_of(path)]
+        for path in folder_of(package).rglob("*.py")
+        for other in imported_rooms(ast.parse(path.read_text(encoding="utf-8")), package)
+        if other != room_of(path, package) and levels[other] >= levels[room_of(path, package)]
     ]
     assert wrong == []
 
 
 def test_the_reading_of_imports_sees_them():
-    text = "from navirl_cli.irl.fit import fit\nimport navirl_cli.logs.load\nfrom navirl_cli import __version__, files"
+    text = (
+        "from navirl_cli.irl.fit import fit\nimport navirl_cli.logs.load\n"
+        "from navirl_cli import __version__, files, logs\n"
+        "from navirl_cli.logs import recording\nfrom navirl_cli.logs.tf.tree import TransformTree"
+    )
     assert imported_rooms(ast.parse(text)) == {"irl", "logs", "__init__", "files"}
+    assert imported_rooms(ast.parse(text), "navirl_cli.logs") == {"load", "recording", "tf"}
 
 
 def test_only_figures_know_matplotlib_and_only_the_command_line_knows_click():

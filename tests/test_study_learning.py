@@ -15,11 +15,11 @@ from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.study import remarks
 from navirl_cli.study import learning
 from navirl_cli.study.learning import closeness, is_of_cycle, jobs_of, learn
 from navirl_cli.study.pipeline import PUBLISHED_THETA, study_of
 from navirl_cli.study.questionnaire import Answer
-from navirl_cli.study.remarks import remarks
 from navirl_cli.study.unseen import beside_obstacle, two_people
 
 TRUTH = Reward((-45.0, -0.8, -4.0, 2.0))

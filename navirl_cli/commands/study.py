@@ -77,11 +77,10 @@ def study(
     """
     from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study
-    from navirl_cli.reports.study import FIGURES, Told
+    from navirl_cli.reports.study import FIGURES, Told, remarks
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
-    from navirl_cli.study.remarks import remarks
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)

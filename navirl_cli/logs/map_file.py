@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.errors import LogError
+from navirl_cli.errors import LogError, brief
 from navirl_cli.logs.recording import Occupancy
-from navirl_cli.logs.yaml_file import brief, read_mapping
+from navirl_cli.logs.yaml_file import read_mapping
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -7,14 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.logs.container.batches import Batch, Damage
+from navirl_cli.logs.container.batches import Batch, Channel, Damage
 from navirl_cli.logs.container.compressed import Opened, open_log
 from navirl_cli.logs.container.log_file import LogFile, threads_here
+from navirl_cli.logs.messages.decode import Decoder, Part
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
+from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
+from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
 from navirl_cli.logs.roles.topics import Choice, Topic, choices, is_missed, topics_of
-from navirl_cli.logs.sample import first_messages
 from navirl_cli.logs.sources import Source
+from navirl_cli.logs.tf.transforms import Link, links_of
+from navirl_cli.logs.tf.tree import TransformTree
 
 #: A topic that comes at least this often is silent where it pauses this many times longer than usual, and this long.
 _REGULAR_S, _PAUSE, _SILENT_S = 1.0, 5.0, 0.5
@@ -109,7 +113,7 @@ def _looked_over(
     starts = [one.start_ns for one in contents if one.start_ns is not None]
     ends = [one.end_ns for one in contents if one.end_ns is not None]
     start = min(starts, default=None)
-    sample = first_messages(files)
+    sample = _first_messages(files)
     encodings = {channel.topic: channel.message_encoding for one in contents for channel in one.channels}
     flows = tuple(
         _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start or 0, sample.stamped.get(name))
@@ -195,3 +199,85 @@ def _clocks(picked: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> lis
             if name in stamped and name != reference:
                 clock.times(stamped[name])
     return [*said, *(f"in the first messages: {note}" for note in clock.notes)]
+
+
+#: Chunks in whose messages stamps are looked for.
+_SAMPLED = 8
+_STAMP = "header.stamp"
+_TF_STAMP = message_types.TF.fields[_STAMP]
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """What the first messages tell."""
+
+    #: Stamps by topic; of transforms those of each message's first.
+    stamped: dict[str, Stamped]
+    #: How the frames connect, "map -> odom -> base_link"; empty without tf.
+    frames: str
+
+
+def _first_messages(files: Sequence[Opened]) -> _Sample:
+    """Look at the messages of the first chunks.
+
+    Args:
+        files: Of the recording.
+    """
+    decoders: dict[Channel, Decoder | None] = {}
+    parts: dict[str, list[Part]] = {}
+
+    def wanted(channel: Channel) -> bool:
+        if channel not in decoders:
+            decoders[channel] = _decoder(channel)
+        return decoders[channel] is not None
+
+    with LogFile(files[0]) as log:
+        for number, batch in enumerate(log.batches(wanted)):
+            # without a summary, channels become known on the way
+            if number >= _SAMPLED * len(log.channels):
+                break
+            decoder = decoders[batch.channel]
+            if decoder is not None:
+                part = decoder.decode(batch)
+                if len(part.order):
+                    parts.setdefault(batch.channel.topic, []).append(part)
+    static: list[Link] = []
+    moving: list[Link] = []
+    for topic, some in parts.items():
+        if _TF_STAMP in some[0].columns:
+            (static if topic.endswith("tf_static") else moving).extend(
+                link for part in some for link in links_of(part.columns, part.counts[message_types.TF.sequence or ""])
+            )
+    stamped = {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
+    return _Sample(stamped, TransformTree(static, moving).describe() if static or moving else "")
+
+
+def _decoder(channel: Channel) -> Decoder | None:
+    """A decoder of a channel's stamps, or of all of its transforms; None where it has none or cannot be decoded."""
+    tf = full_name(channel.schema_name) == message_types.TF.type_name
+    paths = tuple(message_types.TF.fields.values()) if tf else (_STAMP,)
+    try:
+        schema = parse_definition(
+            channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding
+        )
+        leaves = [schema.leaf(path) for path in paths]
+    except SchemaError:
+        return None
+    return Decoder(schema, paths) if isinstance(schema, Schema) and leaves[0].kind == "time" else None
+
+
+def _stamped(topic: str, parts: Sequence[Part]) -> Stamped | None:
+    """The stamps of a topic's first messages."""
+    logs, stamps = [], []
+    for part in parts:
+        if _STAMP in part.columns:
+            logs.append(part.log_time_ns)
+            stamps.append(part.columns[_STAMP])
+        else:
+            counts = part.counts[message_types.TF.sequence or ""]
+            some = counts > 0
+            logs.append(part.log_time_ns[some])
+            stamps.append(part.columns[_TF_STAMP][(np.cumsum(counts) - counts)[some]])
+    log_ns, stamp_ns = np.concatenate(logs), np.concatenate(stamps)
+    rows = np.argsort(log_ns, kind="stable")
+    return Stamped(topic, log_ns[rows], stamp_ns[rows]) if rows.size else None

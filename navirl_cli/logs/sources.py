@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from navirl_cli.errors import LogError
+from navirl_cli.errors import LogError, brief
 from navirl_cli.logs.container.batches import Damage
 from navirl_cli.logs.container.sniff import CONVERT, check_path
-from navirl_cli.logs.yaml_file import brief, read_mapping
+from navirl_cli.logs.yaml_file import read_mapping
 
 _METADATA: Final = "metadata.yaml"
 _INFO: Final = "rosbag2_bagfile_information"

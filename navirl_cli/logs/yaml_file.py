@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from navirl_cli.errors import LogError
+from navirl_cli.errors import LogError, brief
 
 
 def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
@@ -35,12 +35,6 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
     if not isinstance(document, dict):
         raise LogError(f"{expected} {brief(document)}; {remedy}")
     return document
-
-
-def brief(value: object) -> str:
-    """A value as a message shows it: on one line, and not longer than a line."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _problem(error: Exception) -> str:

@@ -1,12 +1,13 @@
 """The report of a study, in words, tables and figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from navirl_cli import __version__
+from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import PAPER_L2
@@ -22,10 +23,10 @@ from navirl_cli.reports.study_tables import (
     signed,
 )
 from navirl_cli.study.claims import Claim
-from navirl_cli.study.learning import CycleFit
+from navirl_cli.study.learning import FIRST, SECOND, CycleFit
 from navirl_cli.study.measures import LEAVES_M
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, Study
-from navirl_cli.study.questionnaire import Shares
+from navirl_cli.study.questionnaire import Answer, Shares
 
 #: Figures that a report can hold: name of the file and caption. The numbers are the paper's.
 FIGURES: Mapping[str, str] = {
@@ -211,3 +212,42 @@ def _method(told: Told) -> Bullets:
             "Cells of 10 cm, by the study's rule from poses to cells.",
         )
     )
+
+
+def remarks(demonstrations: Sequence[Demonstration], answers: Iterable[Answer]) -> list[str]:
+    """Lines about all trials together.
+
+    Args:
+        demonstrations: Of the study.
+        answers: To the questionnaire.
+    """
+    lines = []
+    maps = {(one.grid.origin_m, one.grid.shape, one.grid.resolution_m) for one in demonstrations}
+    if len(maps) > 1:
+        lines.append(
+            f"trials are on {len(maps)} maps: figures of paths lay them over each other, and that of the learnt policy "
+            "shows the scene of the first second-cycle trial"
+        )
+    radii = sorted({one.robot_radius_m for one in demonstrations})
+    if len(radii) > 1:
+        listed = ", ".join(f"{radius:g}" for radius in radii)
+        lines.append(f"robots of radii {listed} m are put together: distances from shells do not compare")
+    pushed = [one for one in demonstrations if one.condition is Condition.FORCE]
+    others = sorted({one.cycle for one in pushed if one.cycle is not None and one.cycle not in {FIRST, SECOND}})
+    if others:
+        lines.append(
+            f"cycle {', '.join(map(str, others))}: shown, but nothing is fitted to it; fits are of cycles 1 and 2"
+        )
+    unsaid = sum(one.cycle is None and one.set is None for one in pushed)
+    if unsaid:
+        lines.append(f"{unsaid} trials of the condition force say neither cycle nor set: nothing is fitted to them")
+    aside = sorted({one.set for one in pushed if one.set is not None and one.cycle is not None})
+    if aside:
+        lines.append(
+            f"trials of the condition force in the sets {', '.join(aside)} are not fitted, though they say a cycle"
+        )
+    people = {one.participant for one in demonstrations}
+    strangers = sorted({one.participant for one in answers} - people)
+    if strangers:
+        lines.append(f"the questionnaire holds answers of participants without a log: {', '.join(strangers)}")
+    return lines

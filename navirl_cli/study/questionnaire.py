@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.errors import ArtefactError
-from navirl_cli.logs.yaml_file import brief
+from navirl_cli.errors import ArtefactError, brief
 
 #: Columns in any order; the modality's may be missing.
 COLUMNS, OPTIONAL = ("participant", "question", "modality", "answer"), "modality"

@@ -1,6 +1,7 @@
 """Frames and the transforms between them, over time."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import Final, NoReturn
 
 import numpy as np
@@ -9,8 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.errors import FrameError
-from navirl_cli.logs.tf.kinship import covers as covers_of
-from navirl_cli.logs.tf.kinship import parents_first, reached
 from navirl_cli.logs.tf.transforms import ALWAYS, Curve, Link, Span, Steps, Transforms, Way, beyond, in_force
 
 #: How far outside of its stamps a moving transform is held constant, in ns: a few periods of a slow localisation.
@@ -221,14 +220,14 @@ class TransformTree:
             ends = {parent for frame in below for parent in self._parents.get(frame, ()) if parent in common}
         if len(ends) == 1:
             return ends
-        parents_first({frame: self._curves(frame) for frame in common})
+        _parents_first({frame: self._curves(frame) for frame in common})
         return {frame for frame in common if frame not in self._parents}
 
     def _climb(self, frame: str, stops: set[str], times: IntArray) -> Iterator[tuple[IntArray, Steps]]:
         """Rows of the times, with the steps from a frame up to a stop that are in force then."""
-        leads = reached(stops, self._children)
+        leads = _reached(stops, self._children)
         graph = {child: self._curves(child, leads) for child in (self._above(frame) & leads) - stops}
-        covers = covers_of(graph)
+        covers = _covers_of(graph)
         force = {child: in_force(curves, covers, times) for child, curves in graph.items()}
         stack: list[tuple[str, IntArray, Steps]] = [(frame, np.arange(len(times)), [])]
         while stack:
@@ -249,11 +248,11 @@ class TransformTree:
 
     def _above(self, frame: str) -> set[str]:
         """A frame and all its ancestors."""
-        return reached({frame}, self._parents)
+        return _reached({frame}, self._parents)
 
     def _refuse(self, target: str, source: str) -> NoReturn:
         """Say why two frames do not connect."""
-        parents_first({frame: self._curves(frame) for frame in self._above(source) | self._above(target)})
+        _parents_first({frame: self._curves(frame) for frame in self._above(source) | self._above(target)})
         alone = [frame for frame in dict.fromkeys((source, target)) if frame not in self.frames]
         known = "; ".join([self.describe(), *(f"{frame} stands alone" for frame in alone)])
         raise FrameError(
@@ -277,3 +276,37 @@ def _branch(frame: str, children: Mapping[str, Iterable[str]], seen: set[str]) -
     branches = [_branch(child, children, seen) for child in below if child in seen or len(seen) < _MOST_SHOWN]
     text = f"({', '.join(branches)})" if len(branches) > 1 else "".join(branches)
     return f"{frame} -> {text}" if text else frame
+
+
+def _parents_first(graph: Mapping[str, Sequence[Curve]]) -> list[str]:
+    """Frames in an order in which parents come before children; refuses circles."""
+    parents = {child: [curve.parent for curve in curves] for child, curves in graph.items()}
+    try:
+        return list(TopologicalSorter(parents).static_order())
+    except CycleError as error:
+        circle = " -> ".join(error.args[1])
+        raise FrameError(
+            f"transform {circle}: expected parents that lead up to one frame, found a circle; "
+            "remap one publisher's frames, or record without it"
+        ) from error
+
+
+def _covers_of(graph: Mapping[str, Sequence[Curve]]) -> dict[str, Span]:
+    """From when to when all transforms from a frame up have stamps, by frame."""
+    found: dict[str, Span] = {}
+    for child in _parents_first(graph):
+        spans = [(curve.span, found.get(curve.parent, ALWAYS)) for curve in graph.get(child, ())]
+        both = [(max(own[0], above[0]), min(own[1], above[1])) for own, above in spans] or [ALWAYS]
+        both = [span for span in both if span[0] <= span[1]] or both
+        found[child] = min(first for first, _ in both), max(last for _, last in both)
+    return found
+
+
+def _reached(begin: set[str], neighbours: Mapping[str, Iterable[str]]) -> set[str]:
+    """The frames of a set and all that can be reached from them."""
+    found, open_ = set(begin), list(begin)
+    while open_:
+        new = set(neighbours.get(open_.pop(), ())) - found
+        found |= new
+        open_.extend(new)
+    return found
