@@ -4,7 +4,6 @@ import re
 from base64 import b64decode, b64encode
 from hashlib import sha256
 from html.parser import HTMLParser
-from math import inf
 from pathlib import Path
 
 import pytest
@@ -12,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from navirl_cli.documents.cells import is_missing, number_of, numeric_columns
-from navirl_cli.documents.document import Bullets, Heading, Paragraph, Picture, Report, Table
+from navirl_cli.documents.document import Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.inline import Mark, Run, plain_of, runs_of
 from navirl_cli.documents.markdown import to_markdown
 from navirl_cli.documents.page import to_html
+from navirl_cli.documents.tables import Column, Spread, Table
 from navirl_cli.errors import ArtefactError
 
 DETERMINISTIC = settings(derandomize=True, deadline=None, max_examples=150)
@@ -58,6 +57,10 @@ def markdown(*blocks, folder=Path()):
     return to_markdown(Report("t", blocks), folder).removeprefix("# t\n\n").removesuffix("\n")
 
 
+def texts(header, *rows, caption=""):
+    return Table(tuple(map(Column, header)), rows, caption)
+
+
 @pytest.fixture
 def picture(tmp_path):
     Image.new("RGB", (31, 20), "red").save(tmp_path / "red.png")
@@ -81,7 +84,7 @@ def test_blanks_become_one_space_and_what_no_file_can_hold_a_sign():
 def test_every_text_can_be_read_back_from_the_page(one, other):
     report = Report(
         "t" + one,
-        (Paragraph(one), Bullets((one, other)), Heading(other), Table((one, other), ((other, one),), other)),
+        (Paragraph(one), Bullets((one, other)), Heading(other), texts((one, other), (other, one), caption=other)),
         "f" + other,
     )
     text = to_html(report)
@@ -91,7 +94,8 @@ def test_every_text_can_be_read_back_from_the_page(one, other):
     assert [element["text"] for element in page.all("p")] == [plain_of(one), plain_of("f" + other)]
     assert [element["text"] for element in page.all("li")[1:]] == [plain_of(one), plain_of(other)]
     assert [element["text"] for element in page.all("a", "h2")] == [plain_of(other)] * 2
-    assert [element["text"] for element in page.all("th", "td")] == [plain_of(x) for x in (one, other, other, one)]
+    cells = [plain_of(one), plain_of(other), plain_of(other or "-"), plain_of(one or "-")]
+    assert [element["text"] for element in page.all("th", "td")] == cells
     for mark, tag in ((Mark.CODE, "code"), (Mark.STRONG, "strong")):
         runs = [run.text for run in runs_of(one) if run.mark is mark]
         assert [element["text"] for element in Page(to_html(Report("t", (Paragraph(one),)))).all(tag)] == runs
@@ -100,7 +104,7 @@ def test_every_text_can_be_read_back_from_the_page(one, other):
 @DETERMINISTIC
 @given(st.lists(st.tuples(TEXTS, TEXTS, TEXTS), min_size=1, max_size=4))
 def test_rows_of_a_markdown_table_keep_their_cells(rows):
-    lines = markdown(Table(rows[0], tuple(rows[1:]))).split("\n")
+    lines = markdown(texts(*rows)).split("\n")
     assert len(lines) == len(rows) + 1
     for line, row in zip((lines[0], *lines[2:]), rows, strict=True):
         cells = re.split(r"(?<!\\)(?:\\\\)*\|", line)
@@ -147,7 +151,9 @@ What was seen.
 | who  |  length m | says            |
 | ---- | --------: | --------------- |
 | a\|b | 6.5 ± 0.1 | <code>\|</code> |
-| c    |       n/a | -               |
+| c    |         - | -1              |
+
+Nobody drove `c`.
 
 Nothing **yet**.
 
@@ -175,8 +181,12 @@ def test_a_whole_report_in_markdown(picture, tmp_path):
         (
             Paragraph("What was seen."),
             Heading("Numbers"),
-            Table(("who", "length m", "says"), (("a|b", "6.5 ± 0.1", "`|`"), ("c", "n/a", "-"))),
-            Table(("empty",), (), "Nothing **yet**."),
+            Table(
+                (Column("who"), Column("length m", decimals=1), Column("says")),
+                (("a|b", Spread(6.5, 0.1), "`|`"), ("c", None, "-1")),
+                note="Nobody drove `c`.",
+            ),
+            texts(("empty",), caption="Nothing **yet**."),
             Bullets(("one", "- two")),
             Heading("Deeper", 3),
             Picture(picture, "A *red* `field`."),
@@ -251,8 +261,8 @@ def test_names_of_headings_are_their_words():
 def test_the_page_is_whole_and_asks_for_nothing(picture):
     blocks = (
         Heading("A"),
-        Table(("who", "n"), (("a", "1"), ("b", "2"))),
-        Table(("n",), (("3",),)),
+        Table((Column("who"), Column("n")), (("a", 1), ("b", 2)), note="By **hand**."),
+        Table((Column("n"),), ((-3,),)),
         Picture(picture, ""),
     )
     text = to_html(Report("Title", blocks, "foot"))
@@ -282,59 +292,27 @@ def test_the_page_is_whole_and_asks_for_nothing(picture):
         "b row ",
         "2  number",
         "n col number",
-        "3  number",
+        "\N{MINUS SIGN}3  number",
     ]
+    assert [element["text"] for element in page.all("p")] == ["By hand.", "foot"]
 
 
 def test_empty_reports_and_tables_are_pages_too():
     empty = Report("Nothing", ())
     assert to_markdown(empty, Path()) == "# Nothing\n"
     assert [element["text"].strip() for element in Page(to_html(empty)).all("main")] == [""]
-    page = Page(to_html(Report("t", (Table(("a", "b"), ()), Bullets(()), Paragraph("")))))
+    page = Page(to_html(Report("t", (texts(("a", "b")), Bullets(()), Paragraph("")))))
     assert (len(page.all("th")), len(page.all("td")), len(page.all("ul"))) == (2, 0, 0)
 
 
 def test_equal_reports_give_equal_bytes(picture):
     def report():
-        return Report("t", (Heading("A"), Table(("x",), (("1",),)), Picture(picture, "c")), "f")
+        return Report("t", (Heading("A"), Table((Column("x"),), ((1,),)), Picture(picture, "c")), "f")
 
     assert to_html(report()) == to_html(report())
     assert to_markdown(report(), picture.parent) == to_markdown(report(), picture.parent)
 
 
-#: Cells by the number they are sorted by.
-NUMBERS = {
-    12: "12|12cm|12 of 40|012|[12, 15]|(12)|12 ± 3|12±3 m/s|< 12|**12** m|12%|12 to inf",
-    -0.5: "-0.5|-0.5 m|\N{MINUS SIGN}0.5|-5e-1|-0.50",
-    1234567.5: "1,234,567.5 cells|1234567.5|+1.2345675E+6",
-    inf: "inf|∞|+inf s",
-    -inf: "-inf",
-    None: "2026-01-31|12:30|1.2.3|1,5|5c9a71fe|info|p01|-|",
-}
-
-
-@pytest.mark.parametrize(
-    ("number", "cell"), [(number, cell) for number, cells in NUMBERS.items() for cell in cells.split("|")]
-)
-def test_numbers_of_cells(number, cell):
-    assert number_of(cell) == number
-
-
-def test_what_is_missing():
-    assert all(map(is_missing, ("", " ", "-", "n/a", "N/A", "nan", "\N{EN DASH}", "\N{EM DASH}", "`-`")))
-    assert not any(map(is_missing, ("0", "-1", "none", "a")))
-
-
-def test_columns_of_numbers_hold_more_numbers_than_words():
-    columns = (("1", "-", "2 m"), ("1", "2", "not told"), ("1", "a", "-"), ("-", "", "n/a"), ("a", "b", "c"))
-    table = Table(("a", "b", "c", "d", "e"), tuple(zip(*columns, strict=True)))
-    assert numeric_columns(table) == (True, True, False, False, False)
-
-
 def test_what_a_caller_got_wrong_is_told():
-    with pytest.raises(ValueError, match="2 columns cannot take the row"):
-        Table(("a", "b"), (("1", "2"), ("1",)))
-    with pytest.raises(ValueError, match="at least one column"):
-        Table((), ())
     with pytest.raises(ValueError, match="2 to 6, found 1"):
         Heading("a", 1)

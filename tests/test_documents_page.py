@@ -12,8 +12,9 @@ from time import monotonic
 import pytest
 from PIL import Image
 
-from navirl_cli.documents.document import Bullets, Heading, Paragraph, Picture, Report, Table
+from navirl_cli.documents.document import Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.page import to_html
+from navirl_cli.documents.tables import Column, Spread, Table
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found; on Debian: apt-get install chromium")
@@ -140,23 +141,24 @@ def page(browser):
 
 def report_with(folder):
     values = (
-        ("b", "2.5 ± 0.5"),
-        ("a", "-"),
-        ("p10", "10 m"),
-        ("p9", "\N{MINUS SIGN}1"),
-        ("c", "not told"),
-        ("d", "n/a"),
+        ("b", Spread(2.5, 0.5)),
+        ("a", None),
+        ("p10", 10.0),
+        ("p9", -1.0),
+        ("c", "not known"),
+        ("d", float("nan")),
+        ("e", float("inf")),
+        ("f", 2.25),
     )
-    values += (("e", "inf"), ("f", "2.25"))
-    wide = tuple(f"column{i}" for i in range(12))
+    wide = tuple(Column(f"column{j}" if j else "", decimals=1) for j in range(12))
     return Report(
         "What a `robot` learnt",
         (
             Paragraph(f"Some **strong** words, and a long one: {'x' * 300}."),
             Heading("Numbers"),
-            Table(("who", "length"), values, "By participant."),
-            Table(("", *wide[1:]), (tuple("1234567.5" for _ in wide),) * 60, "Wide, and longer than a sheet."),
-            Table(("file", "hash"), (("`demos.json`", f"`{'0123456789abcdef' * 4}`"),)),
+            Table((Column("who"), Column("length")), values, "By participant."),
+            Table(wide, ((1234567.5,) * 12,) * 60, "Wide, and longer than a sheet."),
+            Table((Column("file"), Column("hash")), (("`demos.json`", f"`{'0123456789abcdef' * 4}`"),)),
             Heading("Figures of " + "n" * 31),
             Bullets(("one", "two")),
             Picture(folder / "wide.png", "A `wide` one.", "blue"),
@@ -211,10 +213,10 @@ def test_a_click_sorts_numbers_before_words_and_what_is_missing_last(page):
     assert sorted_as(page) == [None, None]
     length = "table:first-of-type th:nth-child(2) button"
     page.click(length)
-    assert column(page, 1) == ["\N{MINUS SIGN}1", "2.25", "2.5 ± 0.5", "10 m", "inf", "not told", "-", "n/a"]
+    assert column(page, 1) == ["\N{MINUS SIGN}1.00", "2.25", "2.50 ± 0.50", "10.00", "inf", "not known", "-", "-"]
     assert sorted_as(page) == [None, "ascending"]
     page.click(length)
-    assert column(page, 1) == ["inf", "10 m", "2.5 ± 0.5", "2.25", "\N{MINUS SIGN}1", "not told", "-", "n/a"]
+    assert column(page, 1) == ["inf", "10.00", "2.50 ± 0.50", "2.25", "\N{MINUS SIGN}1.00", "not known", "-", "-"]
     assert column(page, 0) == ["e", "p10", "b", "f", "p9", "c", "a", "d"]
     assert sorted_as(page) == [None, "descending"]
     page.click(length)

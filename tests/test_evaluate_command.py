@@ -14,7 +14,6 @@ from scipy import stats
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.cli import cli
-from navirl_cli.documents.tables import Format, formatted
 from navirl_cli.evaluation.metrics import METRICS
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
@@ -129,17 +128,3 @@ def test_formats_hold_the_same_numbers(navirl, work):
     assert cell.replace("±", r"$\pm$") in latex
     assert Path("table.tex").read_text() == latex
     assert "area under path m$^2$" in latex
-
-
-def test_latex_escapes_what_latex_reads():
-    text = formatted(["a_b", "c"], [["50 % of {x} & y", "-1.5"], ["#1 ~ ^", "2"]], Format.LATEX)
-    assert text.splitlines() == [
-        r"\begin{tabular}{lr}",
-        r"\toprule",
-        r"a\_b & c \\",
-        r"\midrule",
-        r"50 \% of \{x\} \& y & -1.5 \\",
-        r"\#1 \textasciitilde{} \textasciicircum{} & 2 \\",
-        r"\bottomrule",
-        r"\end{tabular}",
-    ]

@@ -16,7 +16,7 @@ from navirl_cli.commands.shared import (
     progress_bar,
     say,
 )
-from navirl_cli.documents.tables import text_table
+from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import check_writable, make_folder
 from navirl_cli.parallel import map_in_order
@@ -59,17 +59,17 @@ def import_study(runs: Path, output: Path, force: bool, as_json: bool) -> None:
             imported.append(one)
             update(len(imported), one.participant)
     lost += [line for one in imported for line in one.lost]
-    written = [one for one in imported if one.path is not None]
-    if not written:
+    logs = [one for one in imported if one.path is not None]
+    if not logs:
         for line in lost:
             say(line)
         raise ArtefactError(
             f"{runs}: expected the study's published files, found nothing that can be used; fetch them anew"
         )
     if as_json:
-        echo_json({"logs": [_document(one) for one in written], "lost": lost})
+        echo_json({"logs": [_document(one) for one in logs], "lost": lost})
     else:
-        click.echo(text_table(("log", "trials", "course completed in", "size MB"), [_row(one) for one in written]))
+        click.echo(written(Table(_COLUMNS, tuple(map(_row, logs)))))
     finish(lost)
 
 
@@ -88,10 +88,18 @@ def _imported(job: tuple[int, Run, Path], force: bool) -> _Imported:
     return _Imported(run.name, participant.lost, path, len(participant.paths), times, path.stat().st_size)
 
 
-def _row(one: _Imported) -> tuple[str, str, str, str]:
+_COLUMNS = (
+    Column("log"),
+    Column("trials"),
+    Column("completion_s", "course completed in"),
+    Column("size_bytes", "size MB", decimals=2, scale=1e-6),
+)
+
+
+def _row(one: _Imported) -> tuple[Cell, ...]:
     """Of the table."""
     times = [f"{modality} {s:.1f} s" for modality, several in (one.completion_s or {}).items() for s in several]
-    return str(one.path), str(one.trials), ", ".join(times) or "not known", f"{one.size_bytes / 1e6:.2f}"
+    return str(one.path), one.trials, ", ".join(times) or "not known", one.size_bytes
 
 
 def _document(one: _Imported) -> dict[str, object]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option
-from navirl_cli.documents.tables import text_table
+from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.files import check_writable, make_folder
 from navirl_cli.parallel import map_in_order
 
@@ -27,19 +27,20 @@ def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
     paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
     for path in paths:
         check_writable(path, force=force)
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     with progress_bar("simulate", participants) as update:
         work = partial(_simulated, seed=seed, force=force)
         for row in map_in_order(work, list(enumerate(paths, start=1))):
             rows.append(row)
-            update(len(rows), row[0])
-    click.echo(text_table(("log", "trials", "size MB"), rows))
+            update(len(rows), str(row[0]))
+    columns = (Column("log"), Column("trials"), Column("size_bytes", "size MB", decimals=2, scale=1e-6))
+    click.echo(written(Table(columns, tuple(rows))))
 
 
-def _simulated(job: tuple[int, Path], seed: int, force: bool) -> tuple[str, str, str]:
+def _simulated(job: tuple[int, Path], seed: int, force: bool) -> tuple[Cell, ...]:
     """One participant's log, as a row of the table."""
     from navirl_cli.simulation.log import write_log
 
     number, path = job
     session = write_log(number, seed, path, force=force)
-    return str(path), str(len(session.passes)), f"{path.stat().st_size / 1e6:.2f}"
+    return str(path), len(session.passes), path.stat().st_size

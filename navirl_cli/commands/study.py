@@ -27,7 +27,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
-from navirl_cli.documents.tables import text_table
+from navirl_cli.documents.tables import written
 from navirl_cli.files import check_writable, make_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
 
@@ -196,8 +196,7 @@ def _overview(study: "Study", told: "Told") -> str:
     from navirl_cli.reports.study import claims_lines
     from navirl_cli.reports.study_tables import rewards_table
 
-    table = rewards_table(study)
-    lines = [text_table(table.header, table.rows), "", *claims_lines(study.claims)]
+    lines = [written(rewards_table(study)), "", *claims_lines(study.claims)]
     if told.cells:
         lines += ["", f"cells as published: {sum(same for _, same in told.cells)} of {len(told.cells)} paths"]
     return "\n".join(lines)

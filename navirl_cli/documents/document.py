@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from navirl_cli.documents.tables import Table
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -35,25 +37,6 @@ class Bullets:
     """An unordered list, one text an item."""
 
     items: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows of texts under a header; columns of numbers are told by :mod:`navirl_cli.documents.cells`."""
-
-    #: One text a column, at least one.
-    header: tuple[str, ...]
-    #: As many texts each as the header has.
-    rows: tuple[tuple[str, ...], ...]
-    caption: str = ""
-
-    def __post_init__(self) -> None:
-        """Check that all rows are equally long."""
-        if not self.header:
-            raise ValueError("a table needs at least one column")
-        for row in self.rows:
-            if len(row) != len(self.header):
-                raise ValueError(f"a table of {len(self.header)} columns cannot take the row {row}")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ does not fit this, as a lone asterisk or backtick, is shown as it stands.
 import re
 from dataclasses import dataclass
 from enum import StrEnum
+from html import escape
 
 _MARKED = re.compile(
     r"(?<!`)`(?P<code>[^`]+)`(?!`)"
@@ -16,6 +17,30 @@ _MARKED = re.compile(
 _BLANK = re.compile(r"[ \t-\r\x1c-\x1f\x85\u2028\u2029]+")
 #: Characters that no HTML file may hold, or no file at all: names of files bring them along.
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
+#: What has a meaning wherever it stands. Underscores inside of words have none, and an & only before a name.
+_ANYWHERE = re.compile(r"[\\`*\[\]<~$]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])|:(?=//)|(?<=www)\.|(?:(?<=\s)|^)#", re.I)
+#: What has a meaning where a paragraph begins: quotes, items, rules.
+_AT_START = re.compile(r"^(\d*)(>|[.)](?=\s|$)|[-+](?=[\s-]|$))")
+#: A text up to where a long word, such as a hash, may be broken.
+_PIECES = re.compile(r".*?\S{16}(?=\S{16})|.+")
+_LATEX = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "&": r"\&",
+        "%": r"\%",
+        "$": r"\$",
+        "#": r"\#",
+        "_": r"\_",
+        "{": r"\{",
+        "}": r"\}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "±": r"$\pm$",
+        "²": r"$^2$",
+        "³": r"$^3$",
+        "\N{MINUS SIGN}": r"$-$",
+    }
+)
 
 
 class Mark(StrEnum):
@@ -59,3 +84,56 @@ def runs_of(text: str) -> tuple[Run, ...]:
 def plain_of(text: str) -> str:
     """A text without its marks, as for a window's title."""
     return "".join(run.text for run in runs_of(text))
+
+
+def markdown_of(text: str, *, cell: bool = False) -> str:
+    """A text on one line of Markdown, everything but its marks escaped.
+
+    Args:
+        text: With marks.
+        cell: Whether it stands in a table, where bars separate the cells, in code too.
+    """
+    pieces: list[str] = []
+    runs = runs_of(text)
+    for i, run in enumerate(runs):
+        escaped = markdown_escaped(run.text, cell=cell)
+        if run.mark is Mark.NONE:
+            pieces.append(escaped)
+        elif run.mark is Mark.CODE:
+            pieces.append(f"<code>{escaped}</code>" if cell and "|" in run.text else f"`{run.text}`")
+        else:
+            rest = runs[i + 1 :]
+            ends = not rest or (rest[0].mark is Mark.NONE and rest[0].text[0].isspace())
+            pieces.append(_strong(escaped, begins=not pieces or pieces[-1][-1].isspace(), ends=ends))
+    line = "".join(pieces)
+    return line if cell else _AT_START.sub(r"\1\\\2", line)
+
+
+def _strong(escaped: str, *, begins: bool, ends: bool) -> str:
+    """Strong text; asterisks count only where its outermost characters are letters or digits, or blanks are around."""
+    if (begins or escaped[0].isalnum()) and (ends or escaped[-1].isalnum()):
+        return f"**{escaped}**"
+    return f"<strong>{escaped}</strong>"
+
+
+def markdown_escaped(text: str, *, cell: bool = False) -> str:
+    """Plain text, wherever in a line it stands."""
+    escaped = _ANYWHERE.sub(r"\\\g<0>", text)
+    return escaped.replace("|", r"\|") if cell else escaped
+
+
+def latex_of(text: str) -> str:
+    """A text in LaTeX, everything but its marks escaped."""
+    commands = {Mark.CODE: r"\texttt{%s}", Mark.STRONG: r"\textbf{%s}", Mark.NONE: "%s"}
+    return "".join(commands[run.mark].replace("%s", run.text.translate(_LATEX)) for run in runs_of(text))
+
+
+def html_of(text: str) -> str:
+    """A text in HTML, its marks as elements and everything else escaped; long words may be broken."""
+    tags = {Mark.CODE: "code", Mark.STRONG: "strong"}
+    pieces = []
+    for run in runs_of(text):
+        escaped = "<wbr>".join(escape(piece) for piece in _PIECES.findall(run.text))
+        tag = tags.get(run.mark)
+        pieces.append(f"<{tag}>{escaped}</{tag}>" if tag else escaped)
+    return "".join(pieces)

@@ -8,14 +8,11 @@ from hashlib import sha256
 from html import escape
 from importlib.resources import files
 
-from navirl_cli.documents.cells import is_missing, number_of, numeric_columns
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report, Table
-from navirl_cli.documents.inline import Mark, plain_of, runs_of
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.inline import html_of, plain_of
 from navirl_cli.documents.pictures import alt_of, read_picture, shown_size
+from navirl_cli.documents.tables import MINUS, Cell, Table, is_missing, sort_key
 
-_TAGS = {Mark.CODE: "code", Mark.STRONG: "strong"}
-#: A text up to where a long word, such as a hash, may be broken.
-_PIECES = re.compile(r".*?\S{16}(?=\S{16})|.+")
 #: The class of a cell, by whether its column holds numbers.
 _CLASS = {False: "", True: ' class="number"'}
 
@@ -34,11 +31,11 @@ def to_html(report: Report) -> str:
     """
     names = _names(report)
     parts = [f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{_head(report.title)}\n</head>\n<body>']
-    parts.append(f"<header><h1>{_inline(report.title)}</h1></header>")
+    parts.append(f"<header><h1>{html_of(report.title)}</h1></header>")
     parts.append(_contents(report, names))
     parts += ["<main>", *(_block(block, name) for block, name in zip(report.blocks, names, strict=True)), "</main>"]
     if report.footer:
-        parts.append(f"<footer><p>{_inline(report.footer)}</p></footer>")
+        parts.append(f"<footer><p>{html_of(report.footer)}</p></footer>")
     parts.append(f"<script>{_resource('page.js')}</script>\n</body>\n</html>\n")
     return "\n".join(part for part in parts if part)
 
@@ -93,7 +90,7 @@ def _names(report: Report) -> list[str]:
 def _contents(report: Report, names: list[str]) -> str:
     """Links to the headings of level 2, or nothing where there are none."""
     items = [
-        f'<li><a href="#{name}">{_inline(block.text)}</a></li>'
+        f'<li><a href="#{name}">{html_of(block.text)}</a></li>'
         for block, name in zip(report.blocks, names, strict=True)
         if isinstance(block, Heading) and block.level == 2
     ]
@@ -104,39 +101,31 @@ def _block(block: Block, name: str) -> str:
     """One block; `name` is a heading's id."""
     match block:
         case Heading(text, level):
-            return f'<h{level} id="{name}">{_inline(text)}</h{level}>'
+            return f'<h{level} id="{name}">{html_of(text)}</h{level}>'
         case Paragraph(text):
-            return f"<p>{_inline(text)}</p>"
+            return f"<p>{html_of(text)}</p>"
         case Bullets(items):
-            return f"<ul>\n{_lines(f'<li>{_inline(item)}</li>' for item in items)}\n</ul>" if items else ""
+            return f"<ul>\n{_lines(f'<li>{html_of(item)}</li>' for item in items)}\n</ul>" if items else ""
         case Table():
             return _table(block)
         case Picture():
             return _picture(block)
 
 
-def _inline(text: str) -> str:
-    """A text with its marks as elements and everything else escaped."""
-    pieces = []
-    for run in runs_of(text):
-        escaped = "<wbr>".join(escape(piece) for piece in _PIECES.findall(run.text))
-        tag = _TAGS.get(run.mark)
-        pieces.append(f"<{tag}>{escaped}</{tag}>" if tag else escaped)
-    return "".join(pieces)
-
-
 def _table(table: Table) -> str:
     """A table that scrolls in itself, with what it is sorted by beside the cells."""
-    numeric = numeric_columns(table)
     head = [
-        _cell(text, "th", f' scope="col"{_CLASS[right]}') for text, right in zip(table.header, numeric, strict=True)
+        _cell(column.title, "th", f' scope="col"{_CLASS[right]}')
+        for column, right in zip(table.columns, table.numeric, strict=True)
     ]
-    caption = f"<figcaption>{_inline(table.caption)}</figcaption>\n" if table.caption else ""
+    caption = f"<figcaption>{html_of(table.caption)}</figcaption>\n" if table.caption else ""
+    note = f'\n<p class="note">{html_of(table.note)}</p>' if table.note else ""
     label = escape(plain_of(table.caption) or "Table")
+    rows = [_row(_cells(*row, table.numeric)) for row in zip(table.rows, table.shown(MINUS), strict=True)]
     return (
         f'<figure class="table">\n{caption}<div class="scroll" role="region" tabindex="0" aria-label="{label}">\n'
         f"<table>\n<thead>\n{_row(head)}\n</thead>\n<tbody>\n"
-        f"{_lines(_row(_cells(row, numeric)) for row in table.rows)}\n</tbody>\n</table>\n</div>\n</figure>"
+        f"{_lines(rows)}\n</tbody>\n</table>\n</div>{note}\n</figure>"
     )
 
 
@@ -145,24 +134,25 @@ def _row(cells: Iterable[str]) -> str:
     return f"<tr>\n{_lines(cells)}\n</tr>"
 
 
-def _cells(row: tuple[str, ...], numeric: tuple[bool, ...]) -> list[str]:
+def _cells(row: tuple[Cell, ...], texts: tuple[str, ...], numeric: tuple[bool, ...]) -> list[str]:
     """The cells of a row; the first one names the row, unless its column holds numbers."""
-    cells = [_cell(text, "td", _CLASS[right] + _sort_key(text)) for text, right in zip(row, numeric, strict=True)]
+    keys = [_sort_key(cell) for cell in row]
+    cells = [_cell(text, "td", _CLASS[n] + key) for text, n, key in zip(texts, numeric, keys, strict=True)]
     if not numeric[0]:
-        cells[0] = _cell(row[0], "th", f' scope="row"{_sort_key(row[0])}')
+        cells[0] = _cell(texts[0], "th", f' scope="row"{keys[0]}')
     return cells
 
 
 def _cell(text: str, tag: str, attributes: str) -> str:
     """One cell."""
-    return f"<{tag}{attributes}>{_inline(text)}</{tag}>"
+    return f"<{tag}{attributes}>{html_of(text)}</{tag}>"
 
 
-def _sort_key(text: str) -> str:
+def _sort_key(cell: Cell) -> str:
     """What the script sorts a cell by, other than its text."""
-    if is_missing(text):
+    if is_missing(cell):
         return " data-missing"
-    number = number_of(text)
+    number = sort_key(cell)
     return "" if number is None else f' data-number="{str(number).replace("inf", "Infinity")}"'
 
 
@@ -172,7 +162,7 @@ def _picture(picture: Picture) -> str:
     size = shown_size(content)
     attributes = f' width="{size[0]}" height="{size[1]}"' if size else ""
     source = f"data:{kind};base64,{b64encode(content).decode()}"
-    caption = f"\n<figcaption>{_inline(picture.caption)}</figcaption>" if picture.caption else ""
+    caption = f"\n<figcaption>{html_of(picture.caption)}</figcaption>" if picture.caption else ""
     return f'<figure>\n<img src="{source}" alt="{escape(alt_of(picture))}"{attributes}>{caption}\n</figure>'
 
 

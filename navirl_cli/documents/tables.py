@@ -1,12 +1,233 @@
-"""Tables as text, CSV, Markdown or LaTeX."""
+"""Tables of values, and how they are written: as text, CSV, Markdown, LaTeX or JSON; HTML is in :mod:`.page`.
+
+A cell is a value. Its column says how numbers look; all formats show the same words and the same digits.
+"""
 
 import csv
 import io
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
+from math import floor, isfinite, isnan, log10
+from numbers import Integral, Real
+from typing import TypeAlias
 
-from navirl_cli.documents.document import Table
-from navirl_cli.documents.markdown import table_text
+from navirl_cli.documents.inline import latex_of, markdown_of, plain_of
+
+#: The minus sign of typeset text; plain text, CSV and Markdown use the ASCII hyphen.
+MINUS = "\N{MINUS SIGN}"
+#: What stands for a missing value in every format for readers; CSV leaves the cell empty.
+MISSING = "-"
+#: More decimals than these, or more digits before the point, are written with an exponent.
+_MOST_DECIMALS, _MOST_DIGITS = 9, 15
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A value with its uncertainty or scatter: mean ± standard deviation, estimate ± standard error."""
+
+    #: In the unit of the column; NaN where there is no value.
+    mean: float
+    #: In the same unit; NaN where it is not known.
+    std: float
+
+
+@dataclass(frozen=True)
+class Interval:
+    """From one value to another."""
+
+    #: In the unit of the column; NaN where the interval is not known.
+    lower: float
+    #: In the same unit.
+    upper: float
+
+
+#: None, NaN, and composites that begin with NaN, are missing values.
+Cell: TypeAlias = str | bool | int | float | Spread | Interval | None
+#: A value as CSV and JSON hold it.
+Plain: TypeAlias = str | bool | int | float | None
+#: Names of the parts of a composite.
+_PARTS: Mapping[type, tuple[str, str]] = {Spread: ("mean", "std"), Interval: ("lower", "upper")}
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column holds and how its numbers look."""
+
+    #: Name in CSV and JSON: lower case, with the unit of the values, as length_m.
+    name: str
+    #: Title for readers, with the unit that is shown; the name where it is empty.
+    heading: str = ""
+    #: Digits after the point; None: whole numbers as such, others so that the largest has ``significant`` digits.
+    decimals: int | None = None
+    significant: int = 4
+    #: Whether positive numbers have a plus sign, as differences do.
+    sign: bool = False
+    #: Factor from the unit of the values to the unit that is shown: 100 for percent.
+    scale: float = 1.0
+
+    @property
+    def title(self) -> str:
+        """What stands above the column."""
+        return self.heading or self.name
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of values under columns.
+
+    Raises:
+        ValueError: There is no column, or a row has another number of cells.
+        TypeError: A cell holds something else than a value.
+    """
+
+    #: At least one.
+    columns: tuple[Column, ...]
+    #: As many cells each as there are columns.
+    rows: tuple[tuple[Cell, ...], ...]
+    #: Stands above.
+    caption: str = ""
+    #: Stands below: for instance why values are missing.
+    note: str = ""
+    #: By column, whether it is numeric: it holds numbers and nothing else, missing values aside.
+    numeric: tuple[bool, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check the rows."""
+        if not self.columns:
+            raise ValueError("a table needs at least one column")
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"a table of {len(self.columns)} columns cannot take the row {row}")
+            for cell in row:
+                if not (cell is None or isinstance(cell, str | Real | Spread | Interval)):
+                    raise TypeError(f"a cell holds a text, a number, a composite or None, found {cell!r}")
+        columns = (self.column(j) for j in range(len(self.columns)))
+        object.__setattr__(self, "numeric", tuple(map(_is_numeric, columns)))
+
+    @staticmethod
+    def of_texts(header: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> "Table":
+        """A table whose cells are all texts; "-" and the empty text are missing."""
+        cells = tuple(tuple(None if text in {"", MISSING} else text for text in row) for row in rows)
+        return Table(tuple(map(Column, header)), cells, caption)
+
+    def column(self, j: int) -> tuple[Cell, ...]:
+        """The cells of a column."""
+        return tuple(row[j] for row in self.rows)
+
+    def shown(self, minus: str = "-") -> list[tuple[str, ...]]:
+        """The rows as texts for a reader.
+
+        Args:
+            minus: The minus sign of numbers.
+        """
+        columns = (_shown(column, self.column(j), minus) for j, column in enumerate(self.columns))
+        return list(zip(*columns, strict=True))
+
+    def records(self) -> list[dict[str, Plain]]:
+        """The rows for programs: by the columns' names, composites as two numbers with suffixes, missing as None."""
+        names, rows = _plain(self)
+        return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def sort_key(cell: Cell) -> float | None:
+    """The number by which a cell is sorted: its value, mean or lower end; None for texts and missing values."""
+    first = _known(_parts(cell)[0])
+    return float(first) if isinstance(first, Real) and not isinstance(first, bool) else None
+
+
+def is_missing(cell: Cell) -> bool:
+    """Whether a cell has no value."""
+    return _known(_parts(cell)[0]) is None
+
+
+def _plain(table: Table) -> tuple[list[str], list[list[Plain]]]:
+    """Names and rows with one plain value each."""
+    names: list[str] = []
+    columns: list[list[Plain]] = []
+    for j, column in enumerate(table.columns):
+        cells = table.column(j)
+        parts = next((_PARTS[type(cell)] for cell in cells if type(cell) in _PARTS), None)
+        names += [column.name] if parts is None else [f"{column.name}_{part}" for part in parts]
+        values = [_parts(cell) for cell in cells]
+        columns += [[_known(own[k]) if k < len(own) else None for own in values] for k in range(len(parts or [""]))]
+    return names, [list(row) for row in zip(*columns, strict=True)]
+
+
+def _parts(cell: Cell) -> tuple[Plain, ...]:
+    """The plain values of a cell."""
+    match cell:
+        case Spread(mean, std):
+            return mean, std
+        case Interval(lower, upper):
+            return lower, upper
+    return (cell,)
+
+
+def _known(value: Plain) -> Plain:
+    """A value of Python's own types; None for NaN and for the empty text."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return value or None
+    if isinstance(value, Integral):
+        return int(value)
+    return None if isnan(value) else float(value)
+
+
+def _is_numeric(cells: Sequence[Cell]) -> bool:
+    """Whether all values of a column are numbers, and there is one at least."""
+    values = [cell for cell in cells if not is_missing(cell)]
+    return bool(values) and all(sort_key(cell) is not None for cell in values)
+
+
+def _shown(column: Column, cells: Sequence[Cell], minus: str) -> list[str]:
+    """The cells of a column as texts, all numbers with the same digits."""
+    numbers = [_scaled(cell, column.scale) for cell in cells]
+    style = _style(column, [value for parts in numbers for value in parts])
+    texts = [[_number(value, style, minus) for value in parts] for parts in numbers]
+    return [_joined(cell, parts) for cell, parts in zip(cells, texts, strict=True)]
+
+
+def _scaled(cell: Cell, scale: float) -> list[float]:
+    """The known numbers of a cell in the unit that is shown; none of a text."""
+    if sort_key(cell) is None:
+        return []
+    known = [_known(part) for part in _parts(cell)]
+    return [value if scale == 1 else value * scale for value in known if isinstance(value, int | float)]
+
+
+def _style(column: Column, values: Sequence[float]) -> str:
+    """The format of a column's numbers."""
+    sign = "+" if column.sign else ""
+    if column.decimals is not None:
+        return f"{sign}.{column.decimals}f"
+    if all(isinstance(value, int) for value in values):
+        return f"{sign}d"
+    largest = max((abs(value) for value in values if isfinite(value)), default=0.0)
+    digits = 1 if largest == 0 else floor(log10(largest)) + 1
+    decimals = max(0, column.significant - digits)
+    if decimals > _MOST_DECIMALS or digits > _MOST_DIGITS:
+        return f"{sign}.{column.significant - 1}e"
+    return f"{sign}.{decimals}f"
+
+
+def _number(value: float, style: str, minus: str) -> str:
+    """A number; one that is rounded to zero has no sign."""
+    text = format(value, style)
+    return text.lstrip("+-") if not text.strip("+-0.") else text.replace("-", minus)
+
+
+def _joined(cell: Cell, numbers: Sequence[str]) -> str:
+    """A cell as text, its numbers already written."""
+    if is_missing(cell):
+        return MISSING
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinstance(cell, str):
+        return cell
+    return (" to " if isinstance(cell, Interval) else " ± ").join(numbers)
 
 
 class Format(StrEnum):
@@ -21,60 +242,80 @@ class Format(StrEnum):
 
 #: By the ending of a file's name.
 ENDINGS = {".json": Format.JSON, ".csv": Format.CSV, ".md": Format.MARKDOWN, ".tex": Format.LATEX}
-_LATEX = str.maketrans(
-    {
-        "\\": r"\textbackslash{}",
-        "&": r"\&",
-        "%": r"\%",
-        "$": r"\$",
-        "#": r"\#",
-        "_": r"\_",
-        "{": r"\{",
-        "}": r"\}",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
-        "±": r"$\pm$",
-        "²": r"$^2$",
-        "³": r"$^3$",
-        "\N{MINUS SIGN}": r"$-$",
-    }
-)
 
 
-def formatted(header: Sequence[str], rows: Sequence[Sequence[str]], how: Format) -> str:
-    """A table of texts.
+def written(table: Table, how: Format = Format.TEXT) -> str:
+    """A table in one format, without a line break at its end.
 
     Args:
-        header: One text a column.
-        rows: As many texts each.
-        how: Any but JSON, which knows no tables.
+        table: The table.
+        how: CSV and JSON hold plain numbers in the values' own units, without caption and note.
     """
-    if how is Format.CSV:
-        stream = io.StringIO()
-        csv.writer(stream, lineterminator="\n").writerows([header, *rows])
-        return stream.getvalue().rstrip("\n")
-    if how is Format.MARKDOWN:
-        return table_text(Table(tuple(header), tuple(tuple(row) for row in rows)))
-    if how is Format.LATEX:
-        return _latex(header, rows)
-    return text_table(header, rows)
+    match how:
+        case Format.JSON:
+            return json.dumps(table.records(), indent=2, allow_nan=False)
+        case Format.CSV:
+            return _csv(table)
+        case Format.MARKDOWN:
+            return _markdown(table)
+        case Format.LATEX:
+            return _latex(table)
+        case Format.TEXT:
+            return _plain_text(table)
 
 
-def _latex(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A booktabs tabular: texts to the left, numbers to the right."""
-    right = [all(row[i][:1] in "-+0123456789\N{MINUS SIGN}" for row in rows) for i in range(len(header))]
-    lines = [" & ".join(cell.translate(_LATEX) for cell in row) + r" \\" for row in (header, *rows)]
-    columns = "".join("r" if one else "l" for one in right)
-    body = [r"\toprule", lines[0], r"\midrule", *lines[1:], r"\bottomrule"]
-    return "\n".join([rf"\begin{{tabular}}{{{columns}}}", *body, r"\end{tabular}"])
+def _csv(table: Table) -> str:
+    names, rows = _plain(table)
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([names, *rows])
+    return stream.getvalue().removesuffix("\n")
 
 
-def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns aligned by their widest entry; those that begin with a digit or a sign to the right."""
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    right = [all(row[i][:1] in "-+0123456789n" for row in rows) for i in range(len(header))]
-    lines = []
-    for row in (header, *rows):
-        cells = [cell.rjust(w) if r else cell.ljust(w) for cell, w, r in zip(row, widths, right, strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
+def _plain_text(table: Table) -> str:
+    """Columns aligned by their widest entry: numbers to the right, texts to the left."""
+    header = [column.title for column in table.columns]
+    rows = [[plain_of(text) for text in row] for row in (header, *table.shown())]
+    lines = ["  ".join(row).rstrip() for row in _aligned(rows, table.numeric)]
+    return "\n".join(filter(None, (plain_of(table.caption), *lines, plain_of(table.note))))
+
+
+def _markdown(table: Table) -> str:
+    """Header, rule and rows in columns of one width, between caption and note."""
+    header = [column.title for column in table.columns]
+    grid = [[markdown_of(text, cell=True) for text in row] for row in (header, *table.shown())]
+    widths = [max(3, *(len(row[j]) for row in grid)) for j in range(len(header))]
+    rule = ["-" * (width - n) + ":" * n for width, n in zip(widths, table.numeric, strict=True)]
+    lines = [f"| {' | '.join(row)} |" for row in _aligned([grid[0], rule, *grid[1:]], table.numeric)]
+    caption = [markdown_of(table.caption), ""] if table.caption else []
+    note = ["", markdown_of(table.note)] if table.note else []
+    return "\n".join((*caption, *lines, *note))
+
+
+def _latex(table: Table) -> str:
+    """A booktabs tabular between caption and note, which are paragraphs."""
+    header = [latex_of(column.title) for column in table.columns]
+    rows = [[latex_of(text) for text in row] for row in table.shown(MINUS)]
+    lines = [" & ".join(row) + r" \\" for row in (header, *rows)]
+    columns = "".join("r" if number else "l" for number in table.numeric)
+    body = [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule", *lines[1:]]
+    caption = [latex_of(table.caption), ""] if table.caption else []
+    note = ["", latex_of(table.note)] if table.note else []
+    return "\n".join((*caption, *body, r"\bottomrule", r"\end{tabular}", *note))
+
+
+def _aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[list[str]]:
+    """Texts padded to the width of their column."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        [text.rjust(w) if r else text.ljust(w) for text, w, r in zip(row, widths, right, strict=True)] for row in rows
+    ]
+
+
+def formatted(header: Sequence[str], rows: Iterable[Sequence[str]], how: Format) -> str:
+    """A table of texts in one format: for callers that do not hold values yet."""
+    return written(Table.of_texts(header, rows), how)
+
+
+def text_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of texts as text: for callers that do not hold values yet."""
+    return formatted(header, rows, Format.TEXT)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from navirl_cli.artefacts.store import Input, number
-from navirl_cli.documents.document import Table
-from navirl_cli.documents.tables import Format, formatted
+from navirl_cli.documents.tables import Format, Table, formatted
 from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison, GroupMetrics
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
@@ -71,7 +70,7 @@ def _groups(result: Comparison, metrics: Sequence[Metric]) -> tuple[list[str], l
 def group_table(result: Comparison, metrics: Sequence[Metric]) -> Table:
     """Mean and spread by group and kind of path, for a report."""
     header, rows = _groups(result, metrics)
-    return Table(tuple(header), tuple(map(tuple, rows)), "Mean ± standard deviation.")
+    return Table.of_texts(tuple(header), tuple(map(tuple, rows)), "Mean ± standard deviation.")
 
 
 def _by_metric(result: Comparison, metrics: Sequence[Metric], how: Format) -> list[str]:

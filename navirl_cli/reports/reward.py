@@ -10,7 +10,8 @@ import numpy as np
 from navirl_cli import __version__
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report, Table
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.tables import Table
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, center_distance_m
@@ -82,7 +83,9 @@ def report_of(
         _trials(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
         Heading("Made from"),
-        Table(("file", "SHA-256"), tuple((one["file"], one["sha256"]) for one in made_from), "Files and their hashes."),
+        Table.of_texts(
+            ("file", "SHA-256"), tuple((one["file"], one["sha256"]) for one in made_from), "Files and their hashes."
+        ),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
 
@@ -108,7 +111,7 @@ def _ranks(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
         for one in ranks
     ]
     header = ("demonstration", "group", "log-likelihood", "rank", "learnt from")
-    return Table(header, tuple(rows), "Share of the policy's paths that are less likely.")
+    return Table.of_texts(header, tuple(rows), "Share of the policy's paths that are less likely.")
 
 
 def _people(count: int) -> str:
@@ -135,7 +138,7 @@ def _parameters(document: Mapping[str, Any]) -> Table:
             )
         )
     header = ("parameter", "value", "unit", "std. error", "95 % interval", "std. error by participant", "state")
-    return Table(
+    return Table.of_texts(
         header, tuple(rows), "r(s, a) = c0 |s - s'| + a_g d(s)^2 + sum over people of a_p exp(-sigma_p |s - s_p|^2)."
     )
 
@@ -158,7 +161,7 @@ def _held_out(document: Mapping[str, Any]) -> list[Block]:
         for model, one in found["models"].items()
     )
     header = ("model", "per step", *found["left_out"])
-    return [Table(header, rows, "Log-likelihood of each participant under a fit of the others, nats.")]
+    return [Table.of_texts(header, rows, "Log-likelihood of each participant under a fit of the others, nats.")]
 
 
 def _warnings(learnt: LearntReward, document: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
@@ -182,7 +185,7 @@ def _trials(demonstrations: Sequence[Demonstration]) -> Table:
     """The table of extract."""
     rows = [trial_row(one) for one in demonstrations]
     shown = [["-" if row[name] is None else format(row[name], FORMATS[name]) for name in FORMATS] for row in rows]
-    return Table(tuple(FORMATS), tuple(tuple(row) for row in shown), "Trials as extracted.")
+    return Table.of_texts(tuple(FORMATS), tuple(tuple(row) for row in shown), "Trials as extracted.")
 
 
 def _pictures(figures: Mapping[str, Path], *names: str) -> list[Block]:

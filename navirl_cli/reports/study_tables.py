@@ -5,7 +5,7 @@ from math import isfinite
 from statistics import median
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.documents.document import Table
+from navirl_cli.documents.tables import Table
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.reward import Reward
@@ -33,7 +33,7 @@ def claims_table(claims: Iterable[Claim]) -> Table:
         for one in claim.differences
     ]
     header = ("claim", "of", "mean difference", "95 % interval", "n", "close within", "not so for", "verdict")
-    return Table(header, tuple(rows), "Paired differences over participants.")
+    return Table.of_texts(header, tuple(rows), "Paired differences over participants.")
 
 
 def completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]) -> Table:
@@ -42,7 +42,9 @@ def completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]
     for modality, known in completion_s.items():
         times = [time for own in known.values() for time in own]
         rows.append((modality, str(len(times)), f"{median(times):.1f}", plus_minus(*mean_and_spread(times), 1)))
-    return Table(("modality", "n", "median s", "mean ± standard deviation s"), tuple(rows), "Completion times.")
+    return Table.of_texts(
+        ("modality", "n", "median s", "mean ± standard deviation s"), tuple(rows), "Completion times."
+    )
 
 
 def properties_table(groups: Sequence[GroupProperties]) -> Table:
@@ -61,7 +63,7 @@ def properties_table(groups: Sequence[GroupProperties]) -> Table:
         rest = [plus_minus(*group.center_distance_m, 3), plus_minus(*group.onset_m, 3)]
         rest[1] += f" ({group.onsets})" if group.onsets else ""
         rows.append((group.group, str(group.driven.count), *own, *rest))
-    return Table(header, tuple(rows), "Driven paths, mean ± standard deviation over paths.")
+    return Table.of_texts(header, tuple(rows), "Driven paths, mean ± standard deviation over paths.")
 
 
 def rewards_table(study: Study) -> Table:
@@ -80,7 +82,7 @@ def rewards_table(study: Study) -> Table:
         values = [f"{PUBLISHED_THETA[parameter.name]:.4g}" for parameter in parameters]
         name = f"published, {PUBLISHED_PARTICIPANTS} participants"
         rows.append((name, "26", *values, f"{study.published_log_likelihood:.3f} of those here", "-"))
-    return Table(
+    return Table.of_texts(
         header,
         tuple(rows),
         "Parameters ± standard errors, metres throughout: from the observed information, which takes all participants "
@@ -97,7 +99,7 @@ def closeness_table(study: Study) -> Table:
         for cycle, found in _cycles(one)
         if found.near is not None
     ]
-    return Table(
+    return Table.of_texts(
         header,
         tuple(rows),
         "Paths of the second cycle through the centres of their cells (mean ± standard deviation over paths), and "
@@ -113,7 +115,7 @@ def answers_table(bars: Sequence[Shares]) -> Table:
         (one.question, one.modality, str(one.count), f"{one.median:g}", *(str(count) for count in one.counts.tolist()))
         for one in bars
     ]
-    return Table(header, tuple(rows), "Answers to the questionnaire.")
+    return Table.of_texts(header, tuple(rows), "Answers to the questionnaire.")
 
 
 def signed(value: float, unit: str = "") -> str:
