@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.irl.evidence import moves_along
+from navirl_cli.demos.grid import moves_along
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward

@@ -28,9 +28,7 @@ def scene_and_visits():
 
 
 def visits_in(a_scene):
-    start = np.zeros(a_scene.lattice.size)
-    start[a_scene.start] = 1.0
-    return policy_of(PUBLISHED, a_scene).visits(start)
+    return policy_of(PUBLISHED, a_scene).visits_from(a_scene.start)
 
 
 def assert_cells(drawn: DrawnCells, a_scene: Scene, values) -> None:

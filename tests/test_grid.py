@@ -1,15 +1,25 @@
 """Occupancy grids: geometry, growth, resampling, and what ROS occupancy means."""
 
-from math import hypot
+from math import acos, hypot
 
 import factories as make
 import numpy as np
+import oracles
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from navirl_cli.demos.grid import MOVES, Grid, grid_from_occupancy, is_costmap
+from navirl_cli.demos.grid import (
+    MOVE_LENGTHS,
+    MOVES,
+    OPPOSITE,
+    TURN_RAD,
+    Grid,
+    grid_from_occupancy,
+    is_costmap,
+    moves_along,
+)
 from navirl_cli.errors import GridError
 
 DETERMINISTIC = settings(derandomize=True, deadline=None, max_examples=60)
@@ -19,6 +29,22 @@ MAPS = st.tuples(st.integers(1, 9), st.integers(1, 9)).flatmap(lambda shape: arr
 
 def test_the_eight_moves_turn_counter_clockwise_from_x():
     assert MOVES.tolist() == [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]]
+
+
+def test_the_table_of_moves_against_plain_geometry():
+    for one, (dx, dy) in enumerate(oracles.MOVES):
+        assert MOVE_LENGTHS[one] == hypot(dx, dy)
+        assert oracles.MOVES[OPPOSITE[one]] == (-dx, -dy)
+        for other, (ex, ey) in enumerate(oracles.MOVES):
+            turn = acos(max(-1.0, min(1.0, (dx * ex + dy * ey) / hypot(dx, dy) / hypot(ex, ey))))
+            assert TURN_RAD[one, other] == pytest.approx(turn, abs=1e-7)
+
+
+def test_moves_between_cells():
+    cells = np.cumsum(np.array([(0, 0), *oracles.MOVES, (0, 0)]), axis=0)
+    assert moves_along(cells).tolist() == [*range(8), -1]
+    several = np.stack([cells, cells[::-1]])
+    assert moves_along(several).tolist() == [[*range(8), -1], [-1, *OPPOSITE[::-1].tolist()]]
 
 
 @DETERMINISTIC

@@ -7,9 +7,9 @@ import numpy as np
 import oracles
 import pytest
 
-from navirl_cli.demos.grid import MOVES
+from navirl_cli.demos.grid import OPPOSITE
 from navirl_cli.errors import SceneError
-from navirl_cli.irl.lattice import OPPOSITE, Lattice
+from navirl_cli.irl.lattice import Lattice
 
 ROOM = make.grid_of(
     """
@@ -22,10 +22,6 @@ ROOM = make.grid_of(
     """,
     origin_m=(-1.0, 2.0),
 )
-
-
-def test_opposite_moves_undo_each_other():
-    assert (MOVES + MOVES[OPPOSITE] == 0).all()
 
 
 def test_a_lattice_holds_what_can_be_reached_and_no_more():

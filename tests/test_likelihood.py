@@ -7,9 +7,9 @@ import numpy as np
 import oracles
 import pytest
 
-from navirl_cli.demos.grid import Grid
+from navirl_cli.demos.grid import Grid, moves_along
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.irl.evidence import evidence_of, moves_along
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import (
     feature_sums,
@@ -197,11 +197,6 @@ def test_the_expected_gradient_is_zero_at_the_truth():
     assert np.cov(found.scores.T) == pytest.approx(
         -found.hessian / 1500, rel=0.2, abs=0.02 * np.abs(found.hessian).max() / 1500
     )
-
-
-def test_moves_between_cells():
-    cells = np.cumsum(np.array([(0, 0), *oracles.MOVES]), axis=0)
-    assert moves_along(cells).tolist() == list(range(8))
 
 
 def test_no_demonstration_is_nothing_to_learn_from():

@@ -7,8 +7,9 @@ import numpy as np
 import oracles
 import pytest
 
+from navirl_cli.demos.grid import moves_along
 from navirl_cli.evaluation.metrics import area_between_m2, areas_m2, center_distance_m, path_length_m
-from navirl_cli.evaluation.policy_paths import Steps, moves_of
+from navirl_cli.evaluation.policy_paths import Steps
 from navirl_cli.evaluation.segments import ZONES, segments
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
@@ -70,8 +71,8 @@ def test_exact_expectations_agree_with_many_paths(values):
         assert abs(values[name].mean() - value) <= 4 * errors[name] + 1e-9, name
 
 
-def test_moves_of_padded_paths(drawn):
-    moves = moves_of(SCENE.lattice, drawn.states)
+def test_moves_along_padded_paths(drawn):
+    moves = moves_along(SCENE.lattice.cells[drawn.states])
     for number in range(20):
         path = drawn.path(number)
         own = moves[number, : len(path) - 1]

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from navirl_cli.demos.grid import moves_along
 from navirl_cli.evaluation.ranks import path_log_likelihood, ranks_of, sampled_log_likelihoods
-from navirl_cli.irl.evidence import evidence_of, moves_along
+from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import log_likelihood, policy_of
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward

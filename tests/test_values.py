@@ -1,12 +1,14 @@
 """Soft values, policy and visits: against value iteration, worlds solved by hand, and where nothing is finite."""
 
 from math import log
+from pathlib import Path
 
 import factories as make
 import numpy as np
 import oracles
 import pytest
 
+import navirl_cli
 from navirl_cli.demos.grid import Grid
 from navirl_cli.irl import series, values
 from navirl_cli.irl.likelihood import policy_of
@@ -87,6 +89,13 @@ def test_visits_against_mass_moved_step_by_step():
     start[scene.start] = 1.0
     columns, rows = scene.lattice.cells.T
     assert policy.visits(start) == pytest.approx(slow[rows, columns], rel=1e-9, abs=1e-14)
+    assert (policy.visits_from(scene.start) == policy.visits(start)).all()
+
+
+def test_other_rooms_ask_for_the_visits_of_a_state():
+    package = Path(navirl_cli.__file__).parent
+    others = [path for path in package.rglob("*.py") if path.parent.name != "irl"]
+    assert [path.name for path in others if ".visits(" in path.read_text(encoding="utf-8")] == []
 
 
 def test_expected_sums_solve_their_equation_for_several_rewards_at_once():

@@ -10,8 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import GridError
 
-#: Displacements (dx, dy) in cells of the eight moves, in a fixed order that every array "by move" follows.
+#: (8, 2) displacements (dx, dy) of the moves in cells, counter-clockwise from the x axis. All arrays "by move" have
+#: this order.
 MOVES: IntArray = np.array([(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)], dtype=np.int64)
+#: (8,) length of each move in cells.
+MOVE_LENGTHS: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1])
+#: (8,) the move back.
+OPPOSITE: IntArray = (np.arange(8) + 4) % 8
+_APART = np.abs(np.subtract.outer(np.arange(8), np.arange(8)))
+#: (8, 8) unsigned change of direction from one move (row) to the next (column), rad, 0 to pi.
+TURN_RAD: FloatArray = np.minimum(_APART, 8 - _APART) * (np.pi / 4)
+#: (3, 3) number of the move with the displacement (dx, dy) at [dx + 1, dy + 1]; -1 in the middle.
+_NUMBER: IntArray = np.array([[5, 4, 3], [6, -1, 2], [7, 0, 1]], dtype=np.int64)
 
 #: Cells finer than this have no meaning for a robot, coarser ones no paths, m.
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 0.01, 2.0
@@ -170,6 +180,20 @@ class Grid:
                 row, column = np.minimum(low[:, 0] + i, high[:, 0] - 1), np.minimum(low[:, 1] + j, high[:, 1] - 1)
                 occupied[np.minimum(row, rows - 1), np.minimum(column, columns - 1)] = True
         return Grid(occupied, resolution_m, self.origin_m)
+
+
+def moves_along(cells: IntArray) -> IntArray:
+    """Numbers of the moves along paths of neighbouring cells.
+
+    Args:
+        cells: (..., k, 2) column and row.
+
+    Returns:
+        (..., k - 1) rows of MOVES; -1 where a path stays in its cell.
+    """
+    dx, dy = np.moveaxis(np.diff(cells, axis=-2), -1, 0)
+    moves: IntArray = _NUMBER[dx + 1, dy + 1]
+    return moves
 
 
 def is_costmap(data: NDArray[np.int8]) -> bool:

@@ -4,16 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.grid import MOVES
+from navirl_cli.arrays import FloatArray
+from navirl_cli.demos.grid import MOVES, TURN_RAD, moves_along
 from navirl_cli.evaluation.metrics import areas_m2
 from navirl_cli.evaluation.segments import ZONES, Segments, segments
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.paths import SampledPaths
 from navirl_cli.irl.values import Policy
-
-#: (8, 8) rad, the change of direction from one move to another.
-_TURN = np.abs(np.angle(np.exp(1j * (np.arctan2(*MOVES.T[::-1])[None] - np.arctan2(*MOVES.T[::-1])[:, None]))))
 
 
 @dataclass(frozen=True)
@@ -47,14 +44,14 @@ class Steps:
         Returns:
             length_m, heading_rad, and the way in each zone, as NAME_m.
         """
-        flow = policy.visits(np.eye(1, self.lattice.size, start)[0])[:, None] * policy.probability
+        flow = policy.visits_from(start)[:, None] * policy.probability
         found = {"length_m": float((flow * self.lattice.step_m).sum())}
         nobody = bool(np.isnan(self.segments.least_m).all())
         for number, (name, _) in enumerate(ZONES):
             way = float((flow * self.segments.zones_m[..., number]).sum())
             found[f"{name}_m"] = float("nan") if nobody else way
         # The next move is drawn in the state where this one ends; none is in the goal.
-        turns = policy.probability @ _TURN.T
+        turns = policy.probability @ TURN_RAD
         possible = flow > 0
         after = np.where(possible, self.lattice.neighbours, 0)
         found["heading_rad"] = float(
@@ -80,18 +77,9 @@ class Steps:
         return found | {f"{name}_share": found[f"{name}_m"] / length for name, _ in ZONES}
 
 
-def moves_of(lattice: Lattice, states: IntArray) -> IntArray:
-    """(paths, steps) numbers of the moves between successive states of padded paths; -1 where a path stays."""
-    difference = np.diff(lattice.cells[states], axis=1)
-    number = np.full((3, 3), -1)
-    number[MOVES[:, 0] + 1, MOVES[:, 1] + 1] = np.arange(8)
-    moves: IntArray = number[difference[..., 0] + 1, difference[..., 1] + 1]
-    return moves
-
-
 def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
     """Properties that follow from the steps one by one, by name, (paths,) each."""
-    here, moves = paths.states[:, :-1], moves_of(steps.lattice, paths.states)
+    here, moves = paths.states[:, :-1], moves_along(steps.lattice.cells[paths.states])
     driven = moves >= 0
     parts = steps.segments
 
@@ -101,7 +89,7 @@ def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
 
     length = np.where(driven, steps.lattice.step_m[moves], 0.0).sum(axis=1)
     both = driven[:, 1:] & driven[:, :-1]
-    turned = np.where(both, _TURN[moves[:, :-1], moves[:, 1:]], 0.0).sum(axis=1)
+    turned = np.where(both, TURN_RAD[moves[:, :-1], moves[:, 1:]], 0.0).sum(axis=1)
     found = {
         "length_m": length,
         "min_distance_m": np.where(driven, parts.least_m[here, moves], np.inf).min(axis=1),

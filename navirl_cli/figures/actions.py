@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.quiver import Quiver
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.grid import MOVES
+from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES
 from navirl_cli.figures.cells import CellOptions, draw_bar, draw_over, scene_window, shown_states
 from navirl_cli.figures.ground import Window
 from navirl_cli.figures.marks import Marks
@@ -73,7 +73,7 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
     states: IntArray = np.flatnonzero(chosen)
     best = probability[states].argmax(axis=1)
     sure = probability[states, best]
-    along = MOVES[best] / np.hypot(*MOVES[best].T)[:, None]
+    along = MOVES[best] / MOVE_LENGTHS[best, None]
     length = sure[:, None] * _LENGTH * every * scene.lattice.grid.resolution_m
     style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "pivot": "mid", "units": "inches"}
     head: dict[str, Any] = {"width": _SHAFT_IN, "headwidth": 3.4, "headlength": 3.6, "headaxislength": 3.2}

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, Comparison
 from navirl_cli.evaluation.metrics import PAPER_METRICS
@@ -46,7 +44,7 @@ def draw_report(
     draw_paths(axes[0], demonstrations)
     save_figure(figure, files["paths"])
     scene = scenes_of([shown])[0]
-    visits = policy_of(reward, scene).visits(np.eye(1, scene.lattice.size, scene.start)[0])
+    visits = policy_of(reward, scene).visits_from(scene.start)
     figure, axes = new_figure(PAGE_IN, panels=2, columns=2)
     draw_policy_and_reward(axes, [(f"scene of {shown.id}", scene, visits, reward.by_cell(scene))], shown.robot_radius_m)
     save_figure(figure, files["policy"])

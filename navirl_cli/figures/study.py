@@ -5,7 +5,6 @@ from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
@@ -149,9 +148,7 @@ def _properties(study: Study) -> _Drawn:
 def _policies(reward: Reward, scenes: Sequence[tuple[str, Scene]], robot_radius_m: float) -> _Drawn:
     rows = []
     for name, scene in scenes:
-        start = np.zeros(scene.lattice.size)
-        start[scene.start] = 1.0
-        rows.append((name, scene, policy_of(reward, scene).visits(start), reward.by_cell(scene)))
+        rows.append((name, scene, policy_of(reward, scene).visits_from(scene.start), reward.by_cell(scene)))
     figure, axes = new_figure(PAGE_IN, panels=2 * len(rows), columns=2)
     draw_policy_and_reward(axes, rows, robot_radius_m)
     return figure, True

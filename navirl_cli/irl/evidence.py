@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.grid import MOVES
+from navirl_cli.demos.grid import moves_along
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.scene import Scene, scenes_of
 
@@ -138,12 +138,3 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
         state, move = (np.concatenate([step[i] for step in own]) for i in (0, 1))
         parts.append(SceneEvidence(scene, state, move, owners, numbers))
     return Evidence(tuple(parts), tuple(d.participant for d in demonstrations))
-
-
-def moves_along(cells: IntArray) -> IntArray:
-    """Numbers of the moves (rows of MOVES) between successive (k, 2) cells."""
-    difference = np.diff(cells, axis=0)
-    number = np.full((3, 3), -1)
-    number[MOVES[:, 0] + 1, MOVES[:, 1] + 1] = np.arange(8)
-    moves: IntArray = number[difference[:, 0] + 1, difference[:, 1] + 1]
-    return moves

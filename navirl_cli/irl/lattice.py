@@ -8,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.grid import MOVES, Grid
+from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES, OPPOSITE, Grid
 from navirl_cli.errors import SceneError
-
-#: The move that undoes each of MOVES.
-OPPOSITE: IntArray = np.array([4, 5, 6, 7, 0, 1, 2, 3], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -57,8 +54,7 @@ class Lattice:
     @cached_property
     def step_m(self) -> FloatArray:
         """(8,) length of every move, m."""
-        lengths: FloatArray = np.hypot(MOVES[:, 0], MOVES[:, 1]) * self.grid.resolution_m
-        return lengths
+        return MOVE_LENGTHS * self.grid.resolution_m
 
     @cached_property
     def xy_m(self) -> FloatArray:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.irl.lattice import OPPOSITE, Lattice
+from navirl_cli.demos.grid import OPPOSITE
+from navirl_cli.irl.lattice import Lattice
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.irl.lattice import OPPOSITE, Lattice
+from navirl_cli.demos.grid import OPPOSITE
+from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering
 from navirl_cli.irl.series import InfinitePartitionError, Splitting, ValueStatus
 
@@ -66,7 +67,7 @@ class Policy:
         """Expected visits D = (I - P^T)^-1 start (Eq. 10 summed over all times).
 
         Args:
-            start: (n,) weight of every state as a start, e_start for one demonstration.
+            start: (n,) weight of every state as a start.
 
         Returns:
             (n,) expected visits; the flow into the goal is the sum of the weights.
@@ -74,6 +75,12 @@ class Policy:
         weighed = start[self.ordering.order] / self._z
         by_rank = self._splitting.solve(weighed, 1 / self._z, self.sweeps, transposed=True)
         return (by_rank * self._z)[self.ordering.rank]
+
+    def visits_from(self, state: int) -> FloatArray:
+        """(n,) expected visits of a path that starts in a state: :meth:`visits` of e_start."""
+        start = np.zeros(self.lattice.size)
+        start[state] = 1.0
+        return self.visits(start)
 
 
 def solve(ordering: Ordering, reward: FloatArray) -> Policy:

@@ -67,11 +67,7 @@ class Sight:
     @cached_property
     def visits(self) -> "FloatArray":
         """(n,) expected visits of every state."""
-        import numpy as np
-
-        start = np.zeros(self.scene.lattice.size)
-        start[self.scene.start] = 1.0
-        return self.policy.visits(start)
+        return self.policy.visits_from(self.scene.start)
 
     @property
     def options(self) -> "CellOptions":
