@@ -140,7 +140,7 @@ def test_equal_scenes_are_one_object_wherever_they_stand():
         ]
     )
     assert scenes[2] is scenes[0]
-    assert len({id(scene) for scene in scenes}) == 4
+    assert len(set(scenes)) == 4
     assert scenes[1].lattice is scenes[0].lattice, "one map is read once"
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
 from navirl_cli.artefacts.store import Input, number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
@@ -20,8 +20,8 @@ from navirl_cli.irl.status import Status
 from navirl_cli.irl.validation import Validation
 
 
-@dataclass(frozen=True)
-class Search:
+@dataclass(frozen=True, eq=False)
+class Search(ByContent):
     """The way of the search that found a maximum, from its start; a corrected bias is not in it."""
 
     #: (m,) nats.
@@ -30,8 +30,8 @@ class Search:
     theta: FloatArray
 
 
-@dataclass(frozen=True)
-class LearntReward:
+@dataclass(frozen=True, eq=False)
+class LearntReward(ByContent):
     """A reward as read back from its file."""
 
     reward: Reward

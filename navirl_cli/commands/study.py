@@ -111,7 +111,7 @@ def study(
     finish(lost)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Given:
     """What the user gave, read."""
 

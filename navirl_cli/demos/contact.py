@@ -27,7 +27,7 @@ class PushSettings:
     cutoff_hz: float = CUTOFF_HZ
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pushes:
     """The interaction force of a whole recording, and its contacts."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Passage:
     """Cells in the order in which a line passes them."""
 

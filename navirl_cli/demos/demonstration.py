@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
 
@@ -43,8 +43,8 @@ class Contact:
         return float(np.arctan2(self.impulse_ns[1], self.impulse_ns[0]))
 
 
-@dataclass(frozen=True)
-class PersonTrack:
+@dataclass(frozen=True, eq=False)
+class PersonTrack(ByContent):
     """Where one person was during a trial."""
 
     name: str
@@ -83,8 +83,8 @@ class PersonTrack:
         return float(np.hypot(*(self.xy_m - self.mean_m).T).max()) if len(self.t_s) else 0.0
 
 
-@dataclass(frozen=True)
-class Demonstration:
+@dataclass(frozen=True, eq=False)
+class Demonstration(ByContent):
     """A trial: the path that was driven, the forces on the way, and the scene around it."""
 
     #: Name, unique within a file of demonstrations: participant, slash, number of the trial.

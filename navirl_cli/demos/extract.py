@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.demos.checks import (
     check_cells,
     check_gaps,
@@ -56,8 +56,8 @@ class ExtractSettings:
     gain: bool = False
 
 
-@dataclass(frozen=True)
-class Extraction:
+@dataclass(frozen=True, eq=False)
+class Extraction(ByContent):
     """What came out of one recording."""
 
     #: Name of the log.

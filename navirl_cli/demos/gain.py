@@ -35,7 +35,7 @@ class Gain:
     delay_s: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Samples:
     """Moments around pushes at which changes of velocity and force are compared."""
 

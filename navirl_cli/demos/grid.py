@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.arrays import BoolArray, ByContent, FloatArray, IntArray
 from navirl_cli.errors import GridError
 
 #: (8, 2) displacements (dx, dy) of the moves in cells, counter-clockwise from the x axis. All arrays "by move" have
@@ -33,8 +33,8 @@ INSCRIBED, LETHAL = 99, 100
 MOST = 0.9
 
 
-@dataclass(frozen=True)
-class Grid:
+@dataclass(frozen=True, eq=False)
+class Grid(ByContent):
     """An occupancy grid whose rows run along y and whose columns run along x of the map frame."""
 
     #: True where the robot's centre cannot be. Shape (rows, columns): row 0 has the lowest y, column 0 the lowest x.

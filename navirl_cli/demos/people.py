@@ -18,7 +18,7 @@ NEAR_M = 0.5
 FASTEST_M_S = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class People:
     """The people of a trial."""
 
@@ -30,7 +30,7 @@ class People:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Piece:
     """A stretch of a track without leaps."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, draw
@@ -36,8 +36,8 @@ FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
 }
 
 
-@dataclass(frozen=True)
-class GroupMetrics:
+@dataclass(frozen=True, eq=False)
+class GroupMetrics(ByContent):
     """Mean and spread of the paths of one kind in one group of demonstrations."""
 
     group: str
@@ -56,8 +56,8 @@ class GroupMetrics:
     half_interval: Values = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Driven:
+@dataclass(frozen=True, eq=False)
+class Driven(ByContent):
     """What was measured of one demonstration as driven."""
 
     id: str

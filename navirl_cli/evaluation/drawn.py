@@ -27,7 +27,7 @@ class Precision:
     error: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawn:
     """A policy's paths in a scene."""
 

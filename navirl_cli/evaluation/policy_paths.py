@@ -13,7 +13,7 @@ from navirl_cli.irl.paths import SampledPaths
 from navirl_cli.irl.values import Policy
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Steps:
     """What every step of a lattice adds to a path's properties."""
 

@@ -18,7 +18,7 @@ from navirl_cli.evaluation.compare import group_of
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import SampledPaths, sample_paths
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.scene import Scene, scenes_of
 from navirl_cli.irl.values import Policy
 
 
@@ -54,14 +54,14 @@ def ranks_of(
         SceneError: A demonstration's scene has no way.
         InfinitePartitionError: The reward has no policy in a scene.
     """
-    drawn: dict[int, tuple[Policy, FloatArray]] = {}
+    drawn: dict[Scene, tuple[Policy, FloatArray]] = {}
     found = []
     for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
-        if id(scene) not in drawn:
+        if scene not in drawn:
             policy = policy_of(reward, scene)
             paths = sample_paths(policy, scene.start, samples, rng)
-            drawn[id(scene)] = policy, sampled_log_likelihoods(policy, paths)
-        policy, among = drawn[id(scene)]
+            drawn[scene] = policy, sampled_log_likelihoods(policy, paths)
+        policy, among = drawn[scene]
         own = path_log_likelihood(policy, scene.lattice.states_of(one.cells), moves_along(one.cells))
         # Sums in another order differ in their last digits.
         below, equal = (among < own - 1e-9).sum(), (np.abs(among - own) <= 1e-9).sum()

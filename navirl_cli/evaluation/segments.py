@@ -17,7 +17,7 @@ ZONES: tuple[tuple[str, float], ...] = (
 PIECES = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Segments:
     """Properties of straight segments, arrays of one shape (...)."""
 

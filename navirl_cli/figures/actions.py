@@ -27,7 +27,7 @@ _PITCH_IN, _SHAFT_IN, _LENGTH = 0.085, 0.009, 0.95
 _BESIDE_IN = 0.85
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrawnActions:
     """What :func:`draw_actions` put on the axes."""
 

@@ -23,7 +23,7 @@ _OPACITY = 0.9
 _OUTLINE_PT, _OUTLINE_ON_COLOURS_PT, _ROBOT_PT = 0.8, 1.2, 0.6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """What is to be marked on a map, each (k, 2) m, map frame."""
 

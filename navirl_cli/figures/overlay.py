@@ -21,7 +21,7 @@ _MANY, _OPACITY = 10, 0.6
 SAME_START_M = 0.25
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Overlay:
     """Paths of one kind."""
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
@@ -19,8 +19,8 @@ from navirl_cli.parallel import map_in_order
 BATCH = 5
 
 
-@dataclass(frozen=True)
-class Bootstrap:
+@dataclass(frozen=True, eq=False)
+class Bootstrap(ByContent):
     """Fits of the same number of participants, drawn with replacement."""
 
     #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not tell one.

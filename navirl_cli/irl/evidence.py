@@ -13,7 +13,7 @@ from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.scene import Scene, scenes_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SceneEvidence:
     """All steps that were demonstrated in one scene."""
 
@@ -37,7 +37,7 @@ class SceneEvidence:
         return replace(self, **arrays)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Demonstrated steps, by scene; repeated steps count each time."""
 
@@ -119,7 +119,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
     """
     if not demonstrations:
         raise DemonstrationError("no demonstration to learn from: check --condition, --cycle and --only-corrected")
-    steps: dict[int, list[tuple[IntArray, IntArray, int]]] = {}
+    steps: dict[Scene, list[tuple[IntArray, IntArray, int]]] = {}
     scenes = scenes_of(demonstrations)
     for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):
         states = scene.lattice.states_of(demonstration.cells)
@@ -129,10 +129,9 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
                 "end the trial at the first arrival"
             )
         moves = moves_along(demonstration.cells)
-        steps.setdefault(id(scene), []).append((states[:-1], moves, owner))
+        steps.setdefault(scene, []).append((states[:-1], moves, owner))
     parts = []
-    for scene in {id(scene): scene for scene in scenes}.values():
-        own = steps[id(scene)]
+    for scene, own in steps.items():
         owners = np.concatenate([np.full(len(states), owner) for states, _, owner in own])
         numbers = np.concatenate([np.arange(len(states)) for states, _, _ in own])
         state, move = (np.concatenate([step[i] for step in own]) for i in (0, 1))

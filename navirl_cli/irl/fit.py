@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl import uncertainty
 from navirl_cli.irl.adam import ascend
@@ -30,8 +30,8 @@ class Method(StrEnum):
     ADAM = "adam"
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, eq=False)
+class Fit(ByContent):
     """A learnt reward and how sure it is."""
 
     reward: Reward

@@ -12,7 +12,7 @@ from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES, OPPOSITE, Grid
 from navirl_cli.errors import SceneError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lattice:
     """The connected free cells of a grid, numbered, with their eight moves."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence, SceneEvidence
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
@@ -21,8 +21,8 @@ from navirl_cli.irl.terms.term import Jet
 from navirl_cli.irl.values import Policy, solve
 
 
-@dataclass(frozen=True)
-class Likelihood:
+@dataclass(frozen=True, eq=False)
+class Likelihood(ByContent):
     """Log-likelihood of evidence under a reward, with derivatives by parameter."""
 
     value: float
@@ -36,8 +36,8 @@ class Likelihood:
     information: FloatArray
 
 
-@dataclass(frozen=True)
-class StepLikelihood:
+@dataclass(frozen=True, eq=False)
+class StepLikelihood(ByContent):
     """The likelihood step by step."""
 
     #: (m,) number of the demonstration that each step belongs to, and of the step on its path.

@@ -28,7 +28,7 @@ EDGE = 1e-10
 MIN_RADIUS = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
     """The objective at one place; value -inf where it does not exist."""
 
@@ -38,7 +38,7 @@ class Point:
     hessian: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Maximum:
     """Where a search ended."""
 

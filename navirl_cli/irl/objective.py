@@ -16,7 +16,7 @@ from navirl_cli.irl.series import InfinitePartitionError
 from navirl_cli.irl.uncertainty import NO_INFORMATION
 
 
-@dataclass
+@dataclass(eq=False)
 class Objective:
     """Log-likelihood plus log prior density; -inf where the partition function is infinite."""
 

@@ -11,7 +11,7 @@ from navirl_cli.demos.grid import OPPOSITE
 from navirl_cli.irl.lattice import Lattice
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ordering:
     """Ranks of states by a distance to the goal, of whatever kind; the goal has rank 0."""
 
@@ -89,7 +89,7 @@ class Ordering:
         return triangular, csr_array((weight.ravel()[upper.taken], upper.indices, upper.starts), shape=shape)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pattern:
     """A compressed sparse matrix whose entries are some of the steps: where they stand, and which steps they are."""
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.values import Policy
 
@@ -12,8 +12,8 @@ from navirl_cli.irl.values import Policy
 PATIENCE = 1000
 
 
-@dataclass(frozen=True)
-class SampledPaths:
+@dataclass(frozen=True, eq=False)
+class SampledPaths(ByContent):
     """Paths of a policy from a start into the goal."""
 
     #: (paths, longest) states; after its arrival a path stays in the goal.

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.terms.term import Parameter
 
 
-@dataclass(frozen=True)
-class Prior:
+@dataclass(frozen=True, eq=False)
+class Prior(ByContent):
     """log density = shift.x - x.precision.x / 2 - constant, up to what does not depend on the parameters x."""
 
     #: (k, k) positive semidefinite; a zero row knows nothing of its parameter.

@@ -8,7 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
@@ -24,8 +24,8 @@ BETTER = 1e-3
 END_TOLERANCE, END_TRIES = 1e-3, 60
 
 
-@dataclass(frozen=True)
-class Profile:
+@dataclass(frozen=True, eq=False)
+class Profile(ByContent):
     """Profile likelihood of one parameter (Venzon and Moolgavkar 1988, Applied Statistics 37:87)."""
 
     name: str

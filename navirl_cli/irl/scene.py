@@ -15,7 +15,7 @@ from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One planning problem of the decision process (Sec. III-B): states, start, goal and people."""
 

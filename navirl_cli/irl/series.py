@@ -63,7 +63,7 @@ class InfinitePartitionError(RewardError):
         return type(self), (self.status,)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Splitting:
     """A matrix M = L + U >= 0 by rank, with I - L factorised."""
 

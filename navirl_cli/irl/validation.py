@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood
@@ -20,8 +20,8 @@ from navirl_cli.irl.terms.term import Parameter
 from navirl_cli.parallel import map_in_order
 
 
-@dataclass(frozen=True)
-class Validation:
+@dataclass(frozen=True, eq=False)
+class Validation(ByContent):
     """Held-out log-likelihoods, and features demonstrated and expected, of p left-out participants."""
 
     participants: tuple[str, ...]
@@ -52,7 +52,7 @@ class Validation:
             return np.asarray(np.abs(self.demonstrated - self.expected) / self.deviation)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _LeftOut:
     """What one left-out participant says."""
 

@@ -26,7 +26,7 @@ STEPS_PER_BAND = 100.0
 MAX_CLIMBS = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Policy:
     """The soft-optimal policy of one reward on one scene, with the means to solve linear systems in it."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import FrameError, LogError
 from navirl_cli.logs.container.batches import Damage
 from navirl_cli.logs.container.compressed import Opened, open_log
@@ -44,8 +44,8 @@ class Forces(StrEnum):
     IGNORED = "ignored"
 
 
-@dataclass(frozen=True)
-class LoadOptions:
+@dataclass(frozen=True, eq=False)
+class LoadOptions(ByContent):
     """What a user can say about a log."""
 
     #: Topics by role, where there are several that could be meant.

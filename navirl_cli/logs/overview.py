@@ -207,7 +207,7 @@ _STAMP = "header.stamp"
 _TF_STAMP = message_types.TF.fields[_STAMP]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Sample:
     """What the first messages tell."""
 

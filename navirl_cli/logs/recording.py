@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import LogError
 
 #: Name of the metadata record in which a log says what only the experimenter knows. Keys: "participant", a name; in
@@ -19,8 +19,8 @@ SESSION_RECORD = "navirl.session"
 PUBLISHED_RECORD = "navirl.published"
 
 
-@dataclass(frozen=True)
-class Wrench:
+@dataclass(frozen=True, eq=False)
+class Wrench(ByContent):
     """Force measurements in the sensor's frame."""
 
     #: (n,) ns, increasing.
@@ -32,8 +32,8 @@ class Wrench:
     to_base: FloatArray
 
 
-@dataclass(frozen=True)
-class Occupancy:
+@dataclass(frozen=True, eq=False)
+class Occupancy(ByContent):
     """A map as nav_msgs/OccupancyGrid holds it."""
 
     #: (rows, columns) -1 unknown, 0..100 per cent; row 0 has the lowest y.
@@ -43,8 +43,8 @@ class Occupancy:
     origin_m: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Track:
+@dataclass(frozen=True, eq=False)
+class Track(ByContent):
     """Where one person was seen."""
 
     #: What the log calls the person; by places in the message ("1", "2") where it has no names.
@@ -63,8 +63,8 @@ class Jump:
     size_m: float
 
 
-@dataclass(frozen=True)
-class Declared:
+@dataclass(frozen=True, eq=False)
+class Declared(ByContent):
     """What the experimenter's protocol says of the trial that starts at a time."""
 
     t_ns: int
@@ -78,8 +78,8 @@ class Declared:
     nominal_m: FloatArray | None = None
 
 
-@dataclass(frozen=True)
-class Published:
+@dataclass(frozen=True, eq=False)
+class Published(ByContent):
     """The cells that somebody else published for the trial that starts at a time."""
 
     t_ns: int
@@ -88,8 +88,8 @@ class Published:
     cells: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class Session:
+@dataclass(frozen=True, eq=False)
+class Session(ByContent):
     """What only the experimenter knows of a session."""
 
     participant: str | None = None
@@ -102,7 +102,7 @@ class Session:
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Everything of one log, on one clock and in one fixed frame."""
 

@@ -34,7 +34,7 @@ NOTE: Final = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """A published path on the log's clock."""
 

@@ -50,7 +50,7 @@ PARTS: Final[Mapping[tuple[str, str], Part]] = {
 _CONDITIONS: Final = dict(zip(DEMONSTRATIONS, (Condition.FORCE, Condition.JOYSTICK, Condition.AUTONOMOUS), strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PublishedPath:
     """One demonstration as published."""
 
@@ -65,7 +65,7 @@ class PublishedPath:
     cells: IntArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Participant:
     """What was published of one participant."""
 

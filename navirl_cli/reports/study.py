@@ -67,7 +67,7 @@ _ON_GRID = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Told:
     """What a report tells beside the study's numbers."""
 

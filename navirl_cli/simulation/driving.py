@@ -24,7 +24,7 @@ LIMIT_S = 90.0
 Steering = Callable[[float, FloatArray], FloatArray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Path:
     """A line with its length along it."""
 
@@ -63,7 +63,7 @@ class Path:
         return first + int(((self.xy_m[first:stop] - xy_m) ** 2).sum(axis=1).argmin())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """What truly happened on one drive, at steps of 10 ms."""
 

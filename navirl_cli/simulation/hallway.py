@@ -20,7 +20,7 @@ START_X_M, GOAL_X_M = -3.15, 3.15
 OFFSET_M = 0.4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hallway:
     """One participant's hallway."""
 

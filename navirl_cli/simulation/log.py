@@ -27,7 +27,7 @@ HOUR_NS = 3_600_000_000_000
 LATENCY_NS = (1_000_000, 4_000_000)
 
 
-@dataclass
+@dataclass(eq=False)
 class Timeline:
     """A session laid out in time, at steps of 10 ms."""
 

@@ -77,7 +77,7 @@ def side_of(line_m: FloatArray, person_m: FloatArray) -> float:
     return float(nearest[1] - person_m[1])
 
 
-@dataclass
+@dataclass(eq=False)
 class Hand:
     """A hand on the robot or on a joystick, as a function of time and the robot's position."""
 

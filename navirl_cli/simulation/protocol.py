@@ -30,7 +30,7 @@ BACK_M_S = 0.7
 BACK_ASIDE_M = 1.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pass:
     """One trial as it truly was."""
 
@@ -45,7 +45,7 @@ class Pass:
         return self.drive.command_m_s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Session:
     """All passes of a participant, and who they are."""
 

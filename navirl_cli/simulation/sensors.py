@@ -22,7 +22,7 @@ WHEEL_SCALE, HEADING_DRIFT = 0.012, 0.0011
 LOCALISED_M, LOCALISED_RAD, LOCALISED_OVER_S = 0.003, 0.002, 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Poses:
     """Planar poses."""
 

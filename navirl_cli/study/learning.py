@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from navirl_cli.arrays import ByContent
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import NavirlError
 from navirl_cli.evaluation.compare import LEARNT, ON_GRID, compare
@@ -17,8 +18,8 @@ from navirl_cli.irl.reward import Reward
 FIRST, SECOND = 1, 2
 
 
-@dataclass(frozen=True)
-class Closeness:
+@dataclass(frozen=True, eq=False)
+class Closeness(ByContent):
     """Properties of a learnt policy's paths beside those of the demonstrations in the same scenes."""
 
     #: Of the demonstrated paths through the centres of their cells, as the policy's paths go.

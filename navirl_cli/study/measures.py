@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, nominal_of, summary_of
 from navirl_cli.evaluation.metrics import Values, paper_values
@@ -15,8 +15,8 @@ from navirl_cli.irl.scene import Scene, scenes_of
 LEAVES_M = 0.15
 
 
-@dataclass(frozen=True)
-class Measured:
+@dataclass(frozen=True, eq=False)
+class Measured(ByContent):
     """One trial's path."""
 
     id: str
@@ -83,8 +83,8 @@ def onset_m(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray) -> 
     return person - float(line_locate_point(nominal, points(where)))
 
 
-@dataclass(frozen=True)
-class GroupProperties:
+@dataclass(frozen=True, eq=False)
+class GroupProperties(ByContent):
     """Properties of the paths of one group, over its trials with people."""
 
     group: str

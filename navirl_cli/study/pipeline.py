@@ -25,7 +25,7 @@ PUBLISHED_THETA = {
 PUBLISHED_PARTICIPANTS = 13
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Study:
     """Everything that the report of a study tells."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from navirl_cli.arrays import IntArray
+from navirl_cli.arrays import ByContent, IntArray
 from navirl_cli.errors import ArtefactError, brief
 
 #: Columns in any order; the modality's may be missing.
@@ -31,8 +31,8 @@ class Answer:
     answer: int
 
 
-@dataclass(frozen=True)
-class Shares:
+@dataclass(frozen=True, eq=False)
+class Shares(ByContent):
     """How the answers to one question about one modality spread over the levels."""
 
     question: str

@@ -38,7 +38,7 @@ def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "D
     raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sight:
     """One scene under a learnt reward, and what is to be drawn over it."""
 

@@ -1,11 +1,13 @@
 """The cost of leaving the nominal path: a_g d(s)^2 (Eq. 12)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet, Parameter
 
 
+@dataclass(frozen=True)
 class Deviation:
     """Each step costs the squared distance of its cell to the nominal path."""
 

@@ -1,6 +1,7 @@
 """The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 13)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet, Parameter
 
 
+@dataclass(frozen=True)
 class PersonalSpace:
     """Each step costs for being near to people; several people add up."""
 

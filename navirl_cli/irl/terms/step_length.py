@@ -1,11 +1,13 @@
 """The cost of way: c0 |s - s'| (Eq. 11)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet, Parameter
 
 
+@dataclass(frozen=True)
 class StepLength:
     """Each step costs its length."""
 

@@ -27,7 +27,7 @@ class Parameter:
     restarts: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Jet:
     """Value and derivatives of a term on a scene.
 

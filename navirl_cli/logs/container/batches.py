@@ -47,7 +47,7 @@ class Channel:
     message_encoding: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Batch:
     """Messages of one channel that stand in one piece of memory."""
 

@@ -43,7 +43,7 @@ class Piece:
     loose: tuple[bytes, Found] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unpacked:
     """A chunk's records."""
 

@@ -42,7 +42,7 @@ def threads_here() -> int:
     return min(cores(), _MAX_THREADS)
 
 
-@dataclass
+@dataclass(eq=False)
 class _Job(Generic[T]):
     """A piece that is being opened."""
 

@@ -20,7 +20,7 @@ _MAX_REMEMBERED: Final = 16
 _NS_PER_S: Final = 1_000_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """A decoded batch, without its bytes."""
 

@@ -40,7 +40,7 @@ class Contents:
         return sum(self.counts.get(channel.id, 0) for channel in self.channels if channel.topic == topic)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReadResult:
     """Series by topic (only topics that some file has and that decode), and what could not be read."""
 
@@ -166,7 +166,7 @@ def _read_file(
     return walk.parts, damage
 
 
-@dataclass
+@dataclass(eq=False)
 class _Walk:
     """One walk over a file's wanted messages."""
 

@@ -13,7 +13,7 @@ from navirl_cli.logs.messages.decode import Columns, Decoder, Part, empty_column
 from navirl_cli.logs.messages.schema import Schema, SchemaError, parse_definition
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series:
     """The messages of a topic, sorted by time of receipt; equal times keep the order of files and in the file."""
 
@@ -32,7 +32,7 @@ class Series:
         return len(self.log_time_ns)
 
 
-@dataclass
+@dataclass(eq=False)
 class Collector:
     """Gathers the parts of one topic."""
 

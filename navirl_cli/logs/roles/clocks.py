@@ -39,7 +39,7 @@ class TimeSource(StrEnum):
     LOG = "log"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stamped:
     """Times of a topic's messages, before and after correction."""
 
@@ -53,7 +53,7 @@ class Stamped:
     momentary: bool = False
 
 
-@dataclass
+@dataclass(eq=False)
 class Clock:
     """The clock of a recording.
 

@@ -13,7 +13,7 @@ from navirl_cli.logs.roles.clocks import Clock, Stamped
 from navirl_cli.logs.roles.message_types import Kind
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """The messages of one topic."""
 

@@ -18,7 +18,7 @@ from navirl_cli.logs.tf.tree import TransformTree
 _BASES: Final = ("base_footprint", "base_link", "base")
 
 
-@dataclass
+@dataclass(eq=False)
 class Setting:
     """Clock, frames, and where notes go."""
 

@@ -27,7 +27,7 @@ _POSITION: Final = ("px", "py", "pz")
 _ROTATION: Final = ("qx", "qy", "qz", "qw")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Poses:
     """The robot's poses in the fixed frame."""
 

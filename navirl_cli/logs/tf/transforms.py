@@ -33,7 +33,7 @@ _POSE: Final = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Link:
     """Poses of a child frame in its parent frame."""
 
@@ -57,7 +57,7 @@ class Link:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Transforms:
     """Transforms of points from a source frame into a target frame, one for each time."""
 
@@ -177,7 +177,7 @@ class Curve:
 Steps = list[tuple[Curve, IntArray]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Way:
     """How two frames connect at some of the times of a lookup."""
 
