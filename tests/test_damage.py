@@ -23,9 +23,11 @@ from minute_log import (
 )
 
 from navirl_cli.errors import LogError
+from navirl_cli.logs.container.damage import Damage, DamageList
 from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.messages.reader import message_times, read, scan
 
+S = 1_000_000_000
 ZEROS = rf"zero bytes where a record should start \(the power or the disk failed\); {BEHIND}"
 
 
@@ -213,3 +215,36 @@ def test_nothing_but_the_header(path):
     assert note.reason == "the file ends without its closing records; all that it holds was read"
     with pytest.raises(LogError, match=r"minute.mcap: holds no messages: the file ends before the first one; copy it"):
         load_recording(path)
+
+
+# --- the list of damage
+
+
+def test_damage_is_dated_from_the_files_first_message_wherever_that_stands(path):
+    damage = DamageList(path)
+    damage.add_gap(0, 10, "before any message")
+    damage.add(20, 30, "a chunk", (5 * S, 6 * S))
+    damage.met((4 * S, 7 * S))
+    damage.add_gap(40, 50, "between")
+    damage.met(None)
+    damage.met((9 * S, 10 * S))
+    damage.add_gap(60, 70, "the rest")
+    damage.add(80, 80, "no time")
+    expected = [(0.0, 0.0), (1.0, 2.0), (3.0, 5.0), (6.0, None), None]
+    assert [one.span_s for one in damage.in_order()] == expected
+    # the earliest message stands behind the others: the last gap ends before it begins
+    damage.met((1 * S, 2 * S))
+    moved = [(3.0, 3.0), (4.0, 5.0), (6.0, 8.0), (9.0, 9.0), None]
+    assert [one.span_s for one in damage.in_order()] == moved
+
+
+def test_damage_is_listed_once_and_by_place(path):
+    known = Damage(path, 50, 60, "the zstd compression is cut")
+    damage = DamageList(path, [known])
+    damage.add(70, 80, "found first", (0, None))
+    damage.add(10, 20, "found later", (1_500_000_000, 2_000_000_000))
+    damage.add(10, 20, "found later", (1_500_000_000, 2_000_000_000))
+    first, second, third = damage.in_order()
+    assert str(first) == f"{path}: bytes 10 to 20 (0.00 s to 0.50 s): found later"
+    assert second == known
+    assert str(third) == f"{path}: bytes 70 to 80 (0.00 s to its end): found first"

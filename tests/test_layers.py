@@ -32,6 +32,17 @@ ORDERS = {
         ["roles"],
         ["load", "overview"],
     ],
+    "navirl_cli.logs.container": [
+        ["__init__", "damage", "records"],
+        ["batches", "raw", "sniff"],
+        ["chunks", "compressed", "summary"],
+        ["resync"],
+        # what the pieces define reaches the survey through `batches.Definitions`, which both are given
+        ["survey", "opener"],
+        ["log_file"],
+    ],
+    "navirl_cli.logs.messages": [["__init__", "schema"], ["layout"], ["decode", "writer"], ["series"], ["reader"]],
+    "navirl_cli.logs.tf": [["__init__", "transforms"], ["tree"]],
 }
 
 

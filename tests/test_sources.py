@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from navirl_cli.errors import LogError
-from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.sources import Source, sources_of
 
 METADATA = """rosbag2_bagfile_information:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.container.batches import Damage
 from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.messages.reader import Contents, Progress, ReadResult, read, scan
 from navirl_cli.logs.recording import Occupancy, Recording, Wrench
 from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order

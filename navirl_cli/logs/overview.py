@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.logs.container.batches import Batch, Channel, Damage
+from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.messages.decode import Decoder, Part
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from navirl_cli.errors import LogError, brief
-from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.sniff import CONVERT, check_path
 from navirl_cli.logs.yaml_file import read_mapping
 

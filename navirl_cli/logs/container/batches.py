@@ -1,7 +1,6 @@
-"""What reading a container hands on: channels, batches of messages, and what was damaged."""
+"""What reading a log file hands on: channels and batches of messages; and the definitions of a file."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,28 +10,6 @@ from navirl_cli.logs.container import records
 from navirl_cli.logs.container.records import ChannelRecord, SchemaRecord
 
 Buffer = bytes | memoryview
-
-
-@dataclass(frozen=True)
-class Damage:
-    """A part of a file that could not be used."""
-
-    path: Path
-    #: Bytes [start, stop) of the file.
-    start: int
-    stop: int
-    #: What happened, and what was lost by it.
-    reason: str
-    #: Time of receipt that is concerned, s since the file's first message, up to its end where the second is None; None
-    #: where that is not known.
-    span_s: tuple[float, float | None] | None = None
-
-    def __str__(self) -> str:
-        when = ""
-        if self.span_s is not None:
-            begin, end = self.span_s
-            when = f" ({begin:.2f} s to {'its end' if end is None else f'{end:.2f} s'})"
-        return f"{self.path}: bytes {self.start} to {self.stop}{when}: {self.reason}"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import BinaryIO, Final, Self
 import zstandard
 
 from navirl_cli.errors import LogError
-from navirl_cli.logs.container.batches import Damage
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.sniff import check_magic, check_path, decompressed_name
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"

@@ -8,21 +8,21 @@ as in a file that is cut, all chunks are walked over. What cannot be read is not
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from collections.abc import Set as AbstractSet
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Generic, Self, TypeVar
+from typing import Final, Generic, Self, TypeVar
 
 import numpy as np
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
-from navirl_cli.logs.container.batches import Batch, Channel, Damage, Definitions
+from navirl_cli.logs.container.batches import Batch, Channel, Definitions
 from navirl_cli.logs.container.chunks import Piece, Unpacked
 from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.damage import Damage, DamageList
 from navirl_cli.logs.container.opener import Opener, Wanted
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.container.records import HEAD_SIZE
@@ -71,32 +71,35 @@ class LogFile:
         self._raw = RawFile(self._file, self.size)
         with ExitStack() as on_failure:
             on_failure.callback(self._close)
-            self.profile, self.library, data_start = read_header(self.path, self._file, self.size)
-            footer = read_footer(self._file, self.size)
+            self.profile, self.library, self._data_start = read_header(self.path, self._file, self.size)
+            self._footer = read_footer(self._file, self.size)
             #: The summary section, None if there is none or it is damaged.
-            self.summary = footer and read_summary(self._file, self.size, data_start, footer)
+            self.summary = self._footer and read_summary(self._file, self.size, self._data_start, self._footer)
             on_failure.pop_all()
-        summary = self.summary or Summary()
+        self._start(trust_indexes=trust_indexes)
+
+    def _start(self, *, trust_indexes: bool) -> None:
+        """Get ready for a walk; nothing is known yet but the summary."""
+        footer, summary = self._footer, self.summary or Summary()
+        self._damage = DamageList(self.path, self._opened.damage)
+        self._definitions = Definitions(dict(summary.schemas), dict(summary.channels))
         self._survey = Survey(
-            self.path,
             self._raw,
-            data_start,
+            self._data_start,
             summary.chunks,
             footer,
-            self._channels_so_far,
+            self._definitions,
+            self._damage,
             summary_lost=bool(footer and footer.summary_start and self.summary is None),
         )
-        self._survey.damage.extend(opened.damage)
         self._opener = Opener(
             self._raw,
-            self._survey,
-            Definitions(dict(summary.schemas), dict(summary.channels)),
+            self._damage,
+            self._definitions,
             sure=bool(footer and footer.summary_crc),
             counted=summary.statistics is not None,
             trust_indexes=trust_indexes,
         )
-        #: Pieces that the survey has met and that are being opened.
-        self._jobs: deque[_Job[Any]] = deque()
 
     def __enter__(self) -> Self:
         return self
@@ -112,13 +115,13 @@ class LogFile:
 
     @property
     def damage(self) -> list[Damage]:
-        """What could not be read so far, in the file's order: chunks are opened behind the survey."""
-        return sorted(dict.fromkeys(self._survey.damage), key=lambda damage: damage.start)
+        """What could not be read so far, in the file's order."""
+        return self._damage.in_order()
 
     @property
     def lost(self) -> Mapping[int, int]:
-        """Messages by channel that stood in chunks which cannot be used, as their indexes count them."""
-        return self._opener.lost
+        """Messages by channel that message indexes name and that cannot be read."""
+        return self._damage.lost_messages
 
     @property
     def metadata(self) -> list[tuple[str, dict[str, str]]]:
@@ -128,8 +131,7 @@ class LogFile:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """The channels known so far: all of them after a walk, or at once with a complete summary."""
-        definitions = self._opener.definitions
-        return tuple(definitions.channel(number) for number in sorted(definitions.channels))
+        return tuple(self._definitions.channel(number) for number in sorted(self._definitions.channels))
 
     def batches(self, wanted: Wanted) -> Iterator[Batch]:
         """Walk over the file; once, since it collects damage and metadata.
@@ -155,9 +157,12 @@ class LogFile:
         """
         # once a block of this size was freed, glibc keeps smaller ones in place of giving them back chunk by chunk
         np.empty(_KEPT_BYTES, dtype=np.uint8)
+        jobs: deque[_Job[T]] = deque()
         with ThreadPoolExecutor(threads) as pool:
-            jobs: deque[_Job[T]] = self._jobs
             for piece in self._survey.pieces():
+                if piece is None:
+                    yield from self._all_finished(jobs, wanted, use)
+                    continue
                 mine = self._opener.wanted_in(piece, wanted)
                 if mine == ():
                     self._opener.pass_by(piece)
@@ -165,8 +170,7 @@ class LogFile:
                 jobs.append(_Job(piece, pool.submit(self._opener.open, piece, mine, use)))
                 if len(jobs) > threads:
                     yield from self._finished(jobs.popleft(), wanted, use)
-            while jobs:
-                yield from self._finished(jobs.popleft(), wanted, use)
+            yield from self._all_finished(jobs, wanted, use)
         self.position = self.size
         self._survey.check_data()
 
@@ -175,14 +179,13 @@ class LogFile:
         found = self._times()
         promised = self.summary.statistics.by_channel if self.summary and self.summary.statistics else {}
         if self._opener.by_index and any(len(found.get(number, ())) < count for number, count in promised.items()):
-            with LogFile(self._opened, trust_indexes=False) as again:
-                found = again.times()
-            self._survey, self._opener = again._survey, again._opener
+            self._start(trust_indexes=False)
+            found = self._times()
         return found
 
     def _times(self) -> dict[int, IntArray]:
         found: dict[int, list[IntArray]] = {}
-        for piece in self._survey.pieces():
+        for piece in filter(None, self._survey.pieces()):
             times = self._opener.times(piece)
             if times is None:
                 unpacked, _ = self._opener.open(piece, None, lambda batch: batch)
@@ -195,6 +198,11 @@ class LogFile:
         joined = {number: np.sort(np.concatenate(times)) for number, times in found.items()}
         return {number: times for number, times in joined.items() if len(times)}
 
+    def _all_finished(self, jobs: deque[_Job[T]], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
+        """The results of all pieces that are being opened, after which their definitions are known."""
+        while jobs:
+            yield from self._finished(jobs.popleft(), wanted, use)
+
     def _finished(self, job: _Job[T], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
         """The results of a piece, in turn."""
         unpacked, results = job.outcome.result()
@@ -204,14 +212,6 @@ class LogFile:
         else:
             self._opener.pass_by(job.piece)
             yield from results
-
-    def _channels_so_far(self) -> AbstractSet[int]:
-        """Ids of the channels that are defined before the place where the survey is, which is ahead."""
-        for job in self._jobs:
-            unpacked, results = job.outcome.result()
-            if results is None:
-                self._opener.define(job.piece, unpacked)
-        return self._opener.definitions.channels.keys()
 
     def metadata_at(self, offset: int) -> tuple[str, dict[str, str]] | None:
         """The metadata record at an offset of the file, None if there is none."""

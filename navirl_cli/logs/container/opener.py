@@ -1,6 +1,5 @@
 """Pieces of a file become batches of messages: by their message indexes, or by a walk over their records."""
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Final, TypeVar
 
@@ -10,10 +9,10 @@ from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Definitions, message_batch
 from navirl_cli.logs.container.chunks import Decompressor, Piece, Unpacked, indexes_of, open_chunk
+from navirl_cli.logs.container.damage import DamageList
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.container.records import Found
 from navirl_cli.logs.container.resync import walk_on
-from navirl_cli.logs.container.survey import Survey
 
 #: Messages of one piece are apart from those of the next by more than a chunk's bytes.
 _PIECE_ORDER: Final = 1 << 33
@@ -27,8 +26,8 @@ class Opener:
 
     Args:
         raw: The file's bytes.
-        survey: Takes notes of damage.
-        definitions: What is known beforehand.
+        damage: Where damage is added.
+        definitions: What is known beforehand; what the pieces define is added.
         sure: Whether a CRC vouches for them; else they are compared with those that the chunks hold.
         counted: Whether the messages of each channel are counted elsewhere: only that tells what indexes leave out.
         trust_indexes: False to take nothing from message indexes.
@@ -37,23 +36,21 @@ class Opener:
     def __init__(
         self,
         raw: RawFile,
-        survey: Survey,
+        damage: DamageList,
         definitions: Definitions,
         *,
         sure: bool,
         counted: bool,
         trust_indexes: bool,
     ) -> None:
-        self.definitions = definitions
+        self._definitions = definitions
         self._sure = sure
         #: Whether message indexes stand for the messages.
         self.by_index = counted and trust_indexes
         self._trust = trust_indexes
         self._raw = raw
-        self._survey = survey
+        self._damage = damage
         self._decompressor = Decompressor()
-        #: Messages by channel that message indexes name and that are not there; they are told as damage.
-        self.lost: Counter[int] = Counter()
         #: Chunks that were not walked over: a definition may stand in one of them.
         self._passed: list[Piece] = []
 
@@ -61,7 +58,7 @@ class Opener:
         """The wanted channels of a piece by its message indexes; None where only its records tell."""
         if not self._indexed(piece):
             return None
-        return tuple(channel for number in piece.indexes if wanted(channel := self.definitions.channel(number)))
+        return tuple(channel for number in piece.indexes if wanted(channel := self._definitions.channel(number)))
 
     def pass_by(self, piece: Piece) -> None:
         """Take note of a piece over which nobody walked."""
@@ -108,11 +105,11 @@ class Opener:
     def batches(self, piece: Piece, unpacked: Unpacked, wanted: Wanted) -> Iterator[Batch]:
         """Walk over an open piece, note its damage, take up definitions, then yield the wanted channels' messages."""
         if unpacked.trouble:
-            self._survey.note(piece.start, piece.stop, self._lost(unpacked, wanted), piece.span_ns)
+            self._damage.add(piece.start, piece.stop, self._lost(unpacked, wanted), piece.span_ns)
             return
         found, holes = self._records(piece, unpacked)
         for start, stop in [] if piece.cut else holes:
-            self._survey.note(
+            self._damage.add(
                 piece.start,
                 piece.stop,
                 f"no record starts at byte {start} of {len(unpacked.raw)} of the uncompressed chunk; what stands up to "
@@ -124,11 +121,11 @@ class Opener:
         for number in sorted(found.messages.keys() | indexes.keys()):
             offsets = np.array(found.messages.get(number, ()), dtype=np.int64)
             if self._is_defined(number):
-                if wanted(channel := self.definitions.channel(number)):
+                if wanted(channel := self._definitions.channel(number)):
                     yield from self._found(piece, channel, unpacked, offsets, indexes.get(number))
             elif len(offsets):
                 reason = f"{len(offsets)} messages of channel {number}, which is nowhere defined, are lost"
-                self._survey.note(piece.start, piece.stop, reason, piece.span_ns)
+                self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
 
     def _found(
         self,
@@ -144,18 +141,14 @@ class Opener:
         there = 0 if batch is None else len(batch.starts)
         if there < len(named) and not piece.cut:
             reason = f"{len(named)} messages of {channel.topic} in the chunk's message index, {there} are there"
-            self._survey.note(piece.start, piece.stop, reason, piece.span_ns)
-            self.lost[channel.id] += len(named) - there
+            self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
+            self._damage.lost_messages[channel.id] += len(named) - there
         if batch is not None:
             yield batch
 
-    def define(self, piece: Piece, unpacked: Unpacked) -> None:
-        """Take up what is defined in an open piece."""
-        self._take_up(piece, unpacked, self._records(piece, unpacked)[0])
-
     def _indexed(self, piece: Piece) -> bool:
         """Whether the message indexes of a piece can be used."""
-        known, met = self.definitions.knows, self.definitions.met
+        known, met = self._definitions.knows, self._definitions.met
         return (
             self.by_index
             and bool(piece.indexes)
@@ -171,30 +164,31 @@ class Opener:
             return piece.loose[1], []
         if piece.cut:
             return records.walk(unpacked.raw, len(unpacked.raw)), []
-        return walk_on(unpacked.raw, self.definitions.channels.keys())
+        return walk_on(unpacked.raw, self._definitions.channels.keys())
 
     def _take_up(self, piece: Piece, unpacked: Unpacked, found: Found) -> None:
         """Take up the definitions of a piece."""
         for code, start, stop in found.definitions:
             try:
-                self.definitions.add(code, bytes(unpacked.raw[start:stop]))
+                self._definitions.add(code, bytes(unpacked.raw[start:stop]))
             except records.MALFORMED as error:
-                self._survey.note(piece.start, piece.stop, f"a schema or channel record cannot be used: {error}")
+                self._damage.add(piece.start, piece.stop, f"a schema or channel record cannot be used: {error}")
 
     def _is_defined(self, number: int) -> bool:
         """Whether a channel is defined; if need be its definition is looked for in chunks that were passed by."""
-        if not self.definitions.knows(number):
+        if not self._definitions.knows(number):
             passed, self._passed = self._passed, []
             for piece in passed:
-                self.define(piece, self.open(piece, None, lambda batch: batch)[0])
-        return number in self.definitions.channels
+                unpacked, _ = self.open(piece, None, lambda batch: batch)
+                self._take_up(piece, unpacked, self._records(piece, unpacked)[0])
+        return number in self._definitions.channels
 
     def _lost(self, unpacked: Unpacked, wanted: Wanted) -> str:
         """What is wrong with a chunk, and how many messages are lost by it."""
-        self.lost.update({number: len(offsets) for number, (offsets, _) in unpacked.indexes.items()})
+        self._damage.lost_messages.update({number: len(offsets) for number, (offsets, _) in unpacked.indexes.items()})
         counts = [
             f"{len(offsets)} of {channel.topic}"
             for number, (offsets, _) in unpacked.indexes.items()
-            if number in self.definitions.channels and wanted(channel := self.definitions.channel(number))
+            if number in self._definitions.channels and wanted(channel := self._definitions.channel(number))
         ]
         return f"{unpacked.trouble}; messages lost: {', '.join(counts) or 'an unknown number'}"

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.logs.container.batches import Batch, Channel, Damage
+from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.container.compressed import Opened
+from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.messages.decode import Part
 from navirl_cli.logs.messages.series import Collector, Series
