@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import FrameError, LogError
-from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
+from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.reader import Contents, Progress, ReadResult, read, scan
 from navirl_cli.logs.recording import Occupancy, Recording, Wrench
 from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order
@@ -88,7 +89,7 @@ def load_recording(
         return _loaded(source, files, options, progress)
 
 
-def _loaded(source: Source, files: Sequence[Opened], options: LoadOptions, progress: Progress | None) -> Recording:
+def _loaded(source: Source, files: Sequence[RawFile], options: LoadOptions, progress: Progress | None) -> Recording:
     """The recording of files that are open."""
     log = source.name
     contents = [scan(file) for file in files]
@@ -126,7 +127,7 @@ def _loaded(source: Source, files: Sequence[Opened], options: LoadOptions, progr
 
 
 def _read(
-    log: str, contents: Sequence[Contents], files: Sequence[Opened], options: LoadOptions, progress: Progress | None
+    log: str, contents: Sequence[Contents], files: Sequence[RawFile], options: LoadOptions, progress: Progress | None
 ) -> tuple[dict[str, list[Table]], tuple[Damage, ...]]:
     """What was read of every role's topics, and the damage."""
     topics = topics_of(contents)

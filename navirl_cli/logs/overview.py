@@ -8,9 +8,10 @@ import numpy as np
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel
-from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
+from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import Decoder, Part
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
@@ -97,7 +98,7 @@ def overview(
 
 def _looked_over(
     source: Source,
-    files: Sequence[Opened],
+    files: Sequence[RawFile],
     chosen: Mapping[str, Sequence[str]],
     progress: Progress | None,
     *,
@@ -157,7 +158,7 @@ def _flow(topic: Topic, encoding: str, t_ns: IntArray, start_ns: int, stamped: S
     )
 
 
-def _checked(files: Sequence[Opened], progress: Progress | None) -> list[Damage]:
+def _checked(files: Sequence[RawFile], progress: Progress | None) -> list[Damage]:
     """Damage that shows when every message is read."""
     total = sum(file.size for file in files)
     notes: list[Damage] = []
@@ -218,7 +219,7 @@ class _Sample:
     frames: str
 
 
-def _first_messages(files: Sequence[Opened]) -> _Sample:
+def _first_messages(files: Sequence[RawFile]) -> _Sample:
     """Look at the messages of the first chunks.
 
     Args:

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Final, Self
+from typing import BinaryIO, Final
 
 import zstandard
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.container.damage import Damage
+from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.container.sniff import check_magic, check_path, decompressed_name
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
@@ -30,28 +30,7 @@ _MAX_LZ4_BLOCK_BYTES: Final = 4 << 20
 _HEAD_BYTES: Final = 512
 
 
-@dataclass(frozen=True)
-class Opened:
-    """A file to read MCAP from; whoever asked for it closes it."""
-
-    path: Path
-    #: Seekable, with a file descriptor; its offsets are those of the MCAP bytes, decompressed where need be.
-    file: BinaryIO
-    #: Bytes of MCAP.
-    size: int
-    #: What could not be decompressed, in bytes of the compressed file.
-    damage: tuple[Damage, ...]
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.file.close()
-
-
-def open_log(path: Path) -> Opened:
+def open_log(path: Path) -> RawFile:
     """Open a file, and decompress it into a temporary one where it is compressed as a whole.
 
     Args:
@@ -74,7 +53,7 @@ def open_log(path: Path) -> Opened:
             return _decompressed(path, file, size, kind)
         check_magic(path, head, size)
         on_failure.pop_all()
-    return Opened(path, file, size, ())
+    return RawFile(path, file, size)
 
 
 def _compression(head: bytes) -> str:
@@ -88,7 +67,7 @@ def _is_skipped(head: bytes) -> bool:
     return head[1:4] == _SKIPPED and head[0] >> 4 == 5
 
 
-def _decompressed(path: Path, file: BinaryIO, size: int, kind: str) -> Opened:
+def _decompressed(path: Path, file: BinaryIO, size: int, kind: str) -> RawFile:
     """The decompressed bytes of a file, as far as they can be had."""
     damage: list[Damage] = []
     done = 0
@@ -111,7 +90,7 @@ def _decompressed(path: Path, file: BinaryIO, size: int, kind: str) -> Opened:
         check_magic(path, target.read(_HEAD_BYTES), done, kind)
         target.seek(0)
         on_failure.pop_all()
-    return Opened(path, target, done, tuple(damage))
+    return RawFile(path, target, done, tuple(damage))
 
 
 def _discard(target: BinaryIO) -> None:

@@ -21,7 +21,7 @@ from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Definitions
 from navirl_cli.logs.container.chunks import Piece, Unpacked
-from navirl_cli.logs.container.compressed import Opened, open_log
+from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage, DamageList
 from navirl_cli.logs.container.opener import Opener, Wanted
 from navirl_cli.logs.container.raw import RawFile
@@ -62,26 +62,25 @@ class LogFile:
         LogError: It is no MCAP file, or ends before its header does.
     """
 
-    def __init__(self, path: Path | str | Opened, *, trust_indexes: bool = True) -> None:
-        self._opened = opened = path if isinstance(path, Opened) else open_log(Path(path))
-        self.path, self._file, self.size = opened.path, opened.file, opened.size
-        self._keeps_open = opened is path
+    def __init__(self, path: Path | str | RawFile, *, trust_indexes: bool = True) -> None:
+        self._raw = path if isinstance(path, RawFile) else open_log(Path(path))
+        self._keeps_open = self._raw is path
+        self.path, self.size = self._raw.path, self._raw.size
         #: Bytes walked over so far.
         self.position = 0
-        self._raw = RawFile(self._file, self.size)
         with ExitStack() as on_failure:
             on_failure.callback(self._close)
-            self.profile, self.library, self._data_start = read_header(self.path, self._file, self.size)
-            self._footer = read_footer(self._file, self.size)
+            self.profile, self.library, self._data_start = read_header(self._raw)
+            self._footer = read_footer(self._raw)
             #: The summary section, None if there is none or it is damaged.
-            self.summary = self._footer and read_summary(self._file, self.size, self._data_start, self._footer)
+            self.summary = self._footer and read_summary(self._raw, self._data_start, self._footer)
             on_failure.pop_all()
         self._start(trust_indexes=trust_indexes)
 
     def _start(self, *, trust_indexes: bool) -> None:
         """Get ready for a walk; nothing is known yet but the summary."""
         footer, summary = self._footer, self.summary or Summary()
-        self._damage = DamageList(self.path, self._opened.damage)
+        self._damage = DamageList(self.path, self._raw.damage)
         self._definitions = Definitions(dict(summary.schemas), dict(summary.channels))
         self._survey = Survey(
             self._raw,
@@ -111,7 +110,7 @@ class LogFile:
 
     def _close(self) -> None:
         if not self._keeps_open:
-            self._file.close()
+            self._raw.file.close()
 
     @property
     def damage(self) -> list[Damage]:

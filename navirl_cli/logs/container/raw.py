@@ -1,43 +1,63 @@
-"""Bytes of a file by their place."""
+"""A file of MCAP bytes that is open, read by place."""
 
 import os
 import zlib
-from typing import BinaryIO, Final
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Final, Self
+
+from navirl_cli.logs.container.damage import Damage
 
 #: Bytes read at once where messages stand outside of chunks.
 BLOCK: Final = 4 << 20
-#: Bytes read ahead where only heads are looked at.
+#: Bytes read ahead where only the heads of records are looked at.
 _AHEAD: Final = 4096
 
 
 class RawFile:
-    """Bytes of a file by their place, for several threads at once."""
+    """An open file of MCAP bytes, for several threads at once; a context manager that closes it.
 
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        self._descriptor = file.fileno()
+    Args:
+        path: The file's name, for messages.
+        file: The bytes, decompressed where necessary; has a file descriptor.
+        size: Number of bytes.
+        damage: What could not be decompressed, in bytes of the compressed file.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO, size: int, damage: tuple[Damage, ...] = ()) -> None:
+        self.path = path
+        self.file = file
         self.size = size
+        self.damage = damage
         self._ahead = (0, b"")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.file.close()
 
     def read(self, start: int, stop: int) -> bytes:
         """Bytes [start, stop), fewer where the file ends."""
         parts, at, stop = [], start, min(stop, self.size)
-        while at < stop and (part := os.pread(self._descriptor, stop - at, at)):
+        while at < stop and (part := os.pread(self.file.fileno(), stop - at, at)):
             parts.append(part)
             at += len(part)
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def peek(self, start: int, stop: int) -> bytes:
-        """A few bytes, with those behind them read ahead; for one thread."""
+        """A few bytes; those behind them are read ahead. For one thread at a time."""
         at, ahead = self._ahead
         if not at <= start <= stop <= at + len(ahead):
-            at, ahead = start, self.read(start, min(self.size, max(stop, start + _AHEAD)))
+            at, ahead = start, self.read(start, max(stop, start + _AHEAD))
             self._ahead = (at, ahead)
         return ahead[start - at : stop - at]
 
-
-def data_crc(raw: RawFile, stop: int) -> int:
-    """CRC of the file's first `stop` bytes."""
-    crc = 0
-    for at in range(0, stop, BLOCK):
-        crc = zlib.crc32(raw.read(at, min(stop, at + BLOCK)), crc)
-    return crc
+    def crc(self, stop: int) -> int:
+        """CRC of the first `stop` bytes."""
+        crc = 0
+        for at in range(0, stop, BLOCK):
+            crc = zlib.crc32(self.read(at, min(stop, at + BLOCK)), crc)
+        return crc

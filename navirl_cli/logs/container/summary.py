@@ -3,8 +3,7 @@
 import zlib
 from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.container import records
@@ -62,20 +61,17 @@ class Summary:
                 self.statistics = statistics
 
 
-def read_header(path: Path, file: BinaryIO, size: int) -> tuple[str, str, int]:
+def read_header(raw: RawFile) -> tuple[str, str, int]:
     """Profile, library and the first byte behind the header.
 
     Args:
-        path: The file's name, for messages.
-        file: A file that starts with MCAP's magic.
-        size: Its size in bytes.
+        raw: A file that starts with MCAP's magic.
 
     Raises:
         LogError: No header stands behind the magic.
     """
-    start = len(records.MAGIC) + records.HEAD_SIZE
-    file.seek(0)
-    head = file.read(start)
+    path, size, start = raw.path, raw.size, len(records.MAGIC) + records.HEAD_SIZE
+    head = raw.read(0, start)
     code, length = records.RECORD_HEAD.unpack_from(head.ljust(start, b"\0"), len(records.MAGIC))
     if len(head) >= start and code != records.HEADER:
         raise LogError(
@@ -88,7 +84,7 @@ def read_header(path: Path, file: BinaryIO, size: int) -> tuple[str, str, int]:
             f"{size} bytes; nothing was recorded: record or copy it again"
         )
     try:
-        return *records.parse_header(file.read(length)), start + length
+        return *records.parse_header(raw.read(start, start + length)), start + length
     except records.MALFORMED as error:
         raise LogError(
             f"{path}: expected a header record after the magic, found one that does not parse ({error}); "
@@ -96,18 +92,16 @@ def read_header(path: Path, file: BinaryIO, size: int) -> tuple[str, str, int]:
         ) from error
 
 
-def read_footer(file: BinaryIO, size: int) -> Footer | None:
+def read_footer(raw: RawFile) -> Footer | None:
     """The footer of a file that ends as it should.
 
     Args:
-        file: An MCAP file.
-        size: Its size in bytes.
+        raw: An MCAP file.
 
     Returns:
         The footer, or None where the file ends otherwise: its recorder was stopped, or its end was lost.
     """
-    file.seek(max(0, size - records.TAIL_SIZE))
-    tail = file.read(records.TAIL_SIZE)
+    tail = raw.read(max(0, raw.size - records.TAIL_SIZE), raw.size)
     if len(tail) < records.TAIL_SIZE or not tail.endswith(records.MAGIC):
         return None
     code, length = records.RECORD_HEAD.unpack_from(tail)
@@ -116,12 +110,11 @@ def read_footer(file: BinaryIO, size: int) -> Footer | None:
     return records.parse_footer(tail[records.HEAD_SIZE : records.HEAD_SIZE + _FOOTER_SIZE])
 
 
-def read_summary(file: BinaryIO, size: int, data_start: int, footer: Footer) -> Summary | None:
+def read_summary(raw: RawFile, data_start: int, footer: Footer) -> Summary | None:
     """Read the summary section if it is there and sound.
 
     Args:
-        file: An MCAP file.
-        size: Its size in bytes.
+        raw: An MCAP file.
         data_start: First byte behind the header.
         footer: The file's footer.
 
@@ -129,11 +122,10 @@ def read_summary(file: BinaryIO, size: int, data_start: int, footer: Footer) -> 
         The summary, or None if there is none, its CRC is wrong, a record does not parse, or chunks stand outside of the
         data or in each other.
     """
-    end = size - records.TAIL_SIZE
+    end = raw.size - records.TAIL_SIZE
     if not data_start <= footer.summary_start <= end:
         return None
-    file.seek(footer.summary_start)
-    data = file.read(end - footer.summary_start + records.HEAD_SIZE + 16)
+    data = raw.read(footer.summary_start, end + records.HEAD_SIZE + 16)
     if footer.summary_crc and zlib.crc32(data) != footer.summary_crc:
         return None
     summary = Summary()

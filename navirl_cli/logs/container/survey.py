@@ -15,7 +15,7 @@ from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Definitions
 from navirl_cli.logs.container.chunks import COMPRESSIONS, MAX_CHUNK_BYTES, Piece
 from navirl_cli.logs.container.damage import DamageList
-from navirl_cli.logs.container.raw import BLOCK, RawFile, data_crc
+from navirl_cli.logs.container.raw import BLOCK, RawFile
 from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, ChunkIndex, Footer
 from navirl_cli.logs.container.resync import next_record, starts_record
 from navirl_cli.logs.container.summary import ends_data
@@ -106,7 +106,7 @@ class Survey:
     def check_data(self) -> None:
         """Check the CRC of the data section where one was met."""
         expected, stop = self._data_crc or (0, 0)
-        if expected and (crc := data_crc(self._raw, stop)) != expected:
+        if expected and (crc := self._raw.crc(stop)) != expected:
             self._damage.add(
                 0,
                 stop,

@@ -7,16 +7,16 @@ from pathlib import Path
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel
-from navirl_cli.logs.container.compressed import Opened
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
+from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import Part
 from navirl_cli.logs.messages.series import Collector, Series
 
 #: Called with the bytes done and the bytes of all files.
 Progress = Callable[[int, int], None]
 #: A file by its name, or one that is open already, since it had to be decompressed as a whole.
-Log = Path | str | Opened
+Log = Path | str | RawFile
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def read(
     Raises:
         LogError: A file is no MCAP file.
     """
-    files = [paths] if isinstance(paths, Path | str | Opened) else list(paths)
+    files = [paths] if isinstance(paths, Path | str | RawFile) else list(paths)
     sizes = [_size(path) for path in files]
     collectors = {topic: Collector(topic, topic in latest) for topic in wants}
     damage: list[Damage] = []
@@ -141,7 +141,7 @@ def read(
 
 def _size(path: Log) -> int:
     """Bytes of a file, as far as a progress bar is concerned."""
-    if isinstance(path, Opened):
+    if isinstance(path, RawFile):
         return path.size
     return Path(path).stat().st_size if Path(path).is_file() else 0
 
