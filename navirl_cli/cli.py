@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from navirl_cli import __version__
+from navirl_cli.commands.usage import as_options
 from navirl_cli.errors import NavirlError
 
 #: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME (with _ for -); it is loaded
@@ -59,7 +60,7 @@ class LazyGroup(click.Group):
         except NavirlError as error:
             if ctx.params.get("debug"):
                 raise
-            click.echo(f"navirl: {error}", err=True)
+            click.echo(f"navirl: {as_options(str(error))}", err=True)
             ctx.exit(1)
 
 

@@ -13,6 +13,7 @@ from navirl_cli.commands.shared import (
     Number,
     demonstrations_in,
     demos_argument,
+    echo,
     echo_json,
     finish,
     force_option,
@@ -169,7 +170,7 @@ def evaluate(
     if as_json or style == Format.JSON:
         echo_json(content)
     else:
-        click.echo(tables(result, compared, ranked, metrics, Format(style)))
+        echo(tables(result, compared, ranked, metrics, Format(style)))
     finish(result.notes)
 
 

@@ -14,6 +14,7 @@ from navirl_cli.commands.shared import (
     FilePath,
     Number,
     Point,
+    echo,
     echo_json,
     finish,
     force_option,
@@ -178,9 +179,9 @@ def _echo(rows: Sequence[dict[str, Any]], document: Mapping[str, Any], *, as_jso
     if as_json:
         echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
     else:
-        click.echo(trial_table(rows))
+        echo(trial_table(rows))
         if document.get("gain"):
-            click.echo("\n" + gain_table(document["gain"]))
+            echo("\n" + gain_table(document["gain"]))
 
 
 def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from navirl_cli.commands.shared import (
     Number,
     demonstrations_in,
     demos_argument,
+    echo,
     echo_json,
     finish,
     force_option,
@@ -24,6 +25,7 @@ from navirl_cli.commands.shared import (
     say,
     seed_option,
 )
+from navirl_cli.commands.usage import as_options
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.errors import DemonstrationError, NavirlError, RewardError
@@ -168,7 +170,7 @@ def fit(
     if as_json:
         echo_json(document)
     else:
-        click.echo(report(found, analyses))
+        echo(report(found, analyses))
     for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(found)):
         say(line)
     finish(lost)
@@ -277,7 +279,7 @@ def _start(initial: str) -> Reward:
     try:
         return Reward.named(values)
     except RewardError as error:
-        raise click.BadParameter(str(error), param_hint="--init") from None
+        raise click.BadParameter(as_options(str(error)), param_hint="--init") from None
 
 
 def _common_resolution(demonstrations: list[Demonstration]) -> float:

@@ -9,6 +9,7 @@ import click
 from navirl_cli.commands.shared import (
     FilePath,
     bytes_bar,
+    echo,
     echo_json,
     finish,
     json_option,
@@ -51,7 +52,7 @@ def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: 
     if as_json:
         echo_json([_document(view) for view in views])
     else:
-        click.echo("\n\n".join(_text(view) for view in views))
+        echo("\n\n".join(_text(view) for view in views))
     for view in views:
         for note in view.source.notes:
             say(note)

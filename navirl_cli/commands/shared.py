@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.commands.usage import as_options
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 
@@ -109,8 +110,13 @@ def echo_json(document: Any) -> None:
 
 
 def say(line: str) -> None:
-    """A diagnostic on stderr."""
-    click.echo(f"navirl: {line}", err=True)
+    """A diagnostic on stderr, with options where it names arguments."""
+    click.echo(f"navirl: {as_options(line)}", err=True)
+
+
+def echo(text: str) -> None:
+    """A result on stdout, with options where it names arguments."""
+    click.echo(as_options(text))
 
 
 def merged(lines: Iterable[str]) -> list[str]:

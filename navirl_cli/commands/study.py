@@ -13,6 +13,7 @@ from navirl_cli.commands.extraction import all_extracted
 from navirl_cli.commands.shared import (
     FilePath,
     demonstrations_in,
+    echo,
     echo_json,
     finish,
     force_option,
@@ -105,7 +106,7 @@ def study(
     if as_json:
         echo_json(document)
     else:
-        click.echo(_overview(found, told))
+        echo(_overview(found, told))
     for line in notes:
         say(line)
     finish(lost)
