@@ -7,8 +7,9 @@ import pytest
 from matplotlib.colors import to_hex
 
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, LEARNT, ON_GRID, GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.figures.properties import PropertyBar, draw_properties, height_for
+from navirl_cli.figures.properties import PropertyBar, bars_of, draw_properties, height_for
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of
 
@@ -60,6 +61,23 @@ def test_panels_name_metric_and_unit_and_rows_group_and_count():
     assert {label.get_text() for axes in drawn.axes[1:] for label in axes.get_yticklabels()} == {""}
     bottom, top = drawn.axes[0].get_ylim()
     assert bottom > top  # the first row stands at the top
+
+
+def test_every_row_of_metrics_is_a_bar_named_by_group_and_type_of_path():
+    kinds = (DRIVEN, ON_GRID, LEARNT, f"{LEARNT}, other", AVOIDANCE)
+    rows = [
+        GroupMetrics("joystick", kind, count, values((1, 2, 3)), values((4, 5, 6))) for count, kind in enumerate(kinds)
+    ]
+    bars = bars_of(rows)
+    assert [one.label for one in bars] == [
+        "joystick",
+        "joystick, on grid",
+        "joystick, learnt",
+        "joystick, learnt, other",
+        "joystick, avoidance",
+    ]
+    assert [one.key for one in bars] == ["joystick", "joystick", LEARNT, LEARNT, "joystick"]
+    assert [(one.mean, one.std, one.count) for one in bars] == [(row.mean, row.std, row.count) for row in rows]
 
 
 def test_a_note_says_what_bars_and_whiskers_are():

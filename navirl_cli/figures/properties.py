@@ -1,7 +1,7 @@
 """Properties of paths by group as bars (Fig. 7)."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
@@ -52,6 +53,29 @@ class DrawnProperties:
 
     axes: list[Axes]
     bars: list[BarContainer]
+
+
+def bars_of(rows: Iterable[GroupMetrics]) -> list[PropertyBar]:
+    """Bars of measured paths, one for each row.
+
+    Args:
+        rows: Metrics by group and type of path, from top to bottom.
+
+    Returns:
+        The bars. Those of driven paths have the name of their group; others add the type of path. Learnt paths have a
+        colour of their own, all others that of their group.
+    """
+    suffix = {DRIVEN: "", ON_GRID: ", on grid"}
+    return [
+        PropertyBar(
+            row.group + suffix.get(row.kind, f", {row.kind}"),
+            LEARNT if row.kind.split(", ")[0] == LEARNT else row.group,
+            row.mean,
+            row.std,
+            row.count,
+        )
+        for row in rows
+    ]
 
 
 def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:

@@ -48,13 +48,7 @@ def draw_report(
     figure, axes = new_figure(PAGE_IN, panels=2, columns=2)
     draw_policy_and_reward(axes, [(f"scene of {shown.id}", scene, visits, reward.by_cell(scene))], shown.robot_radius_m)
     save_figure(figure, files["policy"])
-    bars = [
-        properties.PropertyBar(
-            f"{row.group}, {row.kind}", LEARNT if row.kind == LEARNT else row.group, row.mean, row.std, row.count
-        )
-        for row in result.groups
-        if row.kind in {DRIVEN, ON_GRID, LEARNT}
-    ]
+    bars = properties.bars_of(row for row in result.groups if row.kind in {DRIVEN, ON_GRID, LEARNT})
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     save_figure(figure, files["properties"], trim=False)

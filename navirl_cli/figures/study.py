@@ -136,10 +136,7 @@ def _answers(bars: Sequence[Shares]) -> _Drawn:
 
 
 def _properties(study: Study) -> _Drawn:
-    bars = [
-        properties.PropertyBar(one.group, one.group, one.driven.mean, one.driven.std, one.driven.count)
-        for one in study.groups
-    ]
+    bars = properties.bars_of(one.driven for one in study.groups)
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     return figure, False

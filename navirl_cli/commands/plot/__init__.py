@@ -126,7 +126,7 @@ def _bars(
 
     from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare, group_of
     from navirl_cli.evaluation.drawn import Precision
-    from navirl_cli.figures.properties import PropertyBar
+    from navirl_cli.figures.properties import bars_of
 
     with progress_bar("evaluate", len(demonstrations)) as update:
         result: Comparison = compare(
@@ -139,13 +139,7 @@ def _bars(
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     for note in result.notes:
         say(note)
-    bars = []
-    for row in result.groups:
-        if row.kind == DRIVEN:
-            bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
-        elif row.kind == ON_GRID and row.group in taught:
-            # Beside learnt paths, which go from cell to cell, what was driven must go from cell to cell too.
-            bars.append(PropertyBar(f"{row.group}, on grid", row.group, row.mean, row.std, row.count))
-        elif row.kind == LEARNT and row.group in taught:
-            bars.append(PropertyBar(f"{row.group}, learnt", LEARNT, row.mean, row.std, row.count))
-    return bars
+    # Learnt paths go from cell to cell: beside them stand the driven ones along their cells.
+    return bars_of(
+        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in taught)
+    )
