@@ -13,7 +13,7 @@ from navirl_cli.irl.terms.personal_space import PersonalSpace
 from navirl_cli.irl.terms.step_length import StepLength
 from navirl_cli.irl.terms.term import Jet, Parameter, Term
 
-#: The reward of the paper (Eqs. 11-13).
+#: The reward of the paper (Eq. 13).
 PAPER_TERMS: tuple[Term, ...] = (StepLength(), Deviation(), PersonalSpace())
 
 

@@ -1,4 +1,4 @@
-"""The cost of leaving the nominal path: a_g d(s)^2 (Eq. 12)."""
+"""The cost of leaving the nominal path: a_g d(s)^2 (second part of Eq. 11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

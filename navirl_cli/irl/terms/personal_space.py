@@ -1,4 +1,4 @@
-"""The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 13)."""
+"""The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 12)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

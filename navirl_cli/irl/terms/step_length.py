@@ -1,4 +1,4 @@
-"""The cost of way: c0 |s - s'| (Eq. 11)."""
+"""The cost of path length: c0 |s - s'| (first part of Eq. 11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
