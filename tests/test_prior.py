@@ -153,3 +153,9 @@ def test_what_only_the_prior_tells_is_told():
     # What tells nothing of them is the regulariser: it only says where they stay small.
     held = fit(evidence, START, 1.0)
     assert held.identified.tolist() == [True, True, False, False]
+
+
+def test_a_prior_of_other_parameters_is_refused():
+    evidence = evidence_of(make.drawn(SCENE, TRUTH, 2, seed=0))
+    with pytest.raises(RewardError, match="`prior`: expected one of c0, a_g, found one of 4 parameters"):
+        fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), prior=Prior.gaussian(MEAN, COVARIANCE))
