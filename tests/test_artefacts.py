@@ -225,7 +225,9 @@ def test_files_appear_whole_or_not_at_all(tmp_path):
     path = tmp_path / "x.json"
     write_json(path, "metrics", {"a": 1}, force=False)
     old = path.read_text()
-    with pytest.raises(ArtefactError, match=r"x\.json: exists already; give another name, or --force"):
+    with pytest.raises(
+        ArtefactError, match=r"x\.json: exists already; choose another name, or replace it with `force`"
+    ):
         write_json(path, "metrics", {"a": 2}, force=False)
     with pytest.raises(ValueError, match="Out of range float"):
         write_json(path, "metrics", {"a": float("nan")}, force=True)

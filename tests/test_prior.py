@@ -38,7 +38,7 @@ def test_the_regulariser_is_the_sum_of_squares_in_scales():
 
 @pytest.mark.parametrize("weight", [-0.1, np.nan, -np.inf])
 def test_a_weight_below_zero_is_refused(weight):
-    with pytest.raises(RewardError, match=f"the regulariser must not be negative, found --l2 {weight:g}"):
+    with pytest.raises(RewardError, match=f"`l2`: expected 0 or more, found {weight:g}"):
         Prior.l2(START.parameters, weight)
 
 

@@ -139,7 +139,7 @@ def test_one_participant_cannot_be_left_out():
     evidence = evidence_of(make.by_participants(SCENE, TRUTH, 1, 3, seed=0))
     with pytest.raises(
         DemonstrationError,
-        match="--cross-validate needs several participants, and all demonstrations are of p01; add logs of others",
+        match="`cross_validate`: expected several participants, found only p01; add logs of others",
     ):
         cross_validate(evidence, START, 0.0)
 

@@ -33,7 +33,7 @@ class Prior(ByContent):
             RewardError: The weight is negative or no number.
         """
         if not weight >= 0:
-            raise RewardError(f"the regulariser must not be negative, found --l2 {weight:g}")
+            raise RewardError(f"`l2`: expected 0 or more, found {weight:g}")
         scale = np.array([parameter.scale for parameter in parameters])
         return Prior(np.diag(weight / scale**2), np.zeros(len(scale)))
 

@@ -91,7 +91,7 @@ def cross_validate(
         DemonstrationError: There is one participant only.
         InfinitePartitionError: A learnt reward has no policy in a left-out scene.
     """
-    names = evidence.several_people("--cross-validate")
+    names = evidence.several_people("cross_validate")
     results = []
     for result in map_in_order(partial(_leave_out, evidence, _models(initial), l2), names, executor):
         results.append(result)
