@@ -44,7 +44,7 @@ def make_folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ArtefactError(f"{path}: cannot be made a folder: {error.strerror}; choose another with -o") from error
+        raise ArtefactError(f"{path}: cannot be made a folder: {error.strerror}; choose another `output`") from error
     return path
 
 
@@ -64,8 +64,8 @@ def check_writable(path: Path, *, force: bool) -> None:
         what = "a folder; name a file in it" if S_ISDIR(kind) else "something else; choose another name"
         raise ArtefactError(f"{path}: expected the name of a file to write, found {what}")
     if kind is not None and not force:
-        raise ArtefactError(f"{path}: exists already; give another name, or --force to replace it")
+        raise ArtefactError(f"{path}: exists already; choose another name, or replace it with `force`")
     if not path.parent.is_dir():
         raise ArtefactError(f"{path}: expected an existing folder, found none at {path.parent}; create it")
     if not os.access(path.parent, os.W_OK):
-        raise ArtefactError(f"{path}: the folder {path.parent} cannot be written; choose another with -o")
+        raise ArtefactError(f"{path}: the folder {path.parent} cannot be written; choose another `output`")

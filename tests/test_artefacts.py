@@ -205,7 +205,7 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
     edited(path, lambda d: d["parameters"][0].update(name="c9"))
-    with pytest.raises(ArtefactError, match="expected the parameters c0, a_g, a_p, sigma_p, found c9"):
+    with pytest.raises(ArtefactError, match=r"expected the parameters of known terms \(c0; .*\), found c9, a_g"):
         read_reward(path)
     edited(path, lambda d: d["parameters"].append({**d["parameters"][0], "name": "c0"}))
     with pytest.raises(ArtefactError, match="found c9, a_g, a_p, sigma_p, c0"):
@@ -225,7 +225,9 @@ def test_files_appear_whole_or_not_at_all(tmp_path):
     path = tmp_path / "x.json"
     write_json(path, "metrics", {"a": 1}, force=False)
     old = path.read_text()
-    with pytest.raises(ArtefactError, match=r"x\.json: exists already; give another name, or --force"):
+    with pytest.raises(
+        ArtefactError, match=r"x\.json: exists already; choose another name, or replace it with `force`"
+    ):
         write_json(path, "metrics", {"a": 2}, force=False)
     with pytest.raises(ValueError, match="Out of range float"):
         write_json(path, "metrics", {"a": float("nan")}, force=True)

@@ -126,7 +126,8 @@ def test_draws_without_a_fit_are_counted(twelve, found, monkeypatch):
     assert (drawn.failed, len(drawn.theta)) == (2, 4)
     monkeypatch.setattr(module, "fit", lambda *_, **__: (_ for _ in ()).throw(DemonstrationError("none")))
     with pytest.raises(
-        DemonstrationError, match=r"^--bootstrap: of 6 draws of participants fewer than two could be learnt from$"
+        DemonstrationError,
+        match=r"^`bootstrap`: fewer than two of 6 draws of participants gave a fit; add demonstrations$",
     ):
         bootstrap(twelve, found, 6, 0, executor=Here())
 
@@ -149,7 +150,7 @@ def test_one_participant_cannot_be_drawn_from():
     evidence = evidence_of(make.by_participants(SCENE, TRUTH, 1, 3, seed=0))
     with pytest.raises(
         DemonstrationError,
-        match="--bootstrap needs several participants, and all demonstrations are of p01; add logs of",
+        match="`bootstrap`: expected several participants, found only p01; add logs of",
     ):
         bootstrap(evidence, fit(evidence, START), 5, 0)
 
@@ -160,7 +161,7 @@ def test_a_participant_none_of_whose_steps_is_left_is_not_drawn(twelve):
         for owner in np.unique(part.owner).tolist():
             masks[owner] = np.full(int((part.owner == owner).sum()), twelve.participants[owner] == "p01")
     alone = twelve.only(masks)
-    with pytest.raises(DemonstrationError, match="all demonstrations are of p01"):
+    with pytest.raises(DemonstrationError, match="expected several participants, found only p01"):
         bootstrap(alone, fit(alone, START), 8, 0, executor=Here())
 
 

@@ -71,7 +71,7 @@ def test_an_unknown_extension_is_refused(tmp_path, name, found):
 def test_an_existing_file_is_refused_and_kept(tmp_path):
     path = tmp_path / "a.png"
     path.write_bytes(b"mine")
-    with pytest.raises(ArtefactError, match=r"a\.png: exists already.*--force"):
+    with pytest.raises(ArtefactError, match=r"a\.png: exists already.*`force`"):
         save_figure(figure(), path)
     assert path.read_bytes() == b"mine"
 

@@ -130,7 +130,7 @@ def test_a_path_that_is_always_shortest_has_no_best_cost_of_way():
 
 @pytest.mark.parametrize("l2", [-1.0, -1e-12, np.nan])
 def test_a_regulariser_below_zero_is_refused(many, l2):
-    with pytest.raises(RewardError, match="regulariser must not be negative, found --l2"):
+    with pytest.raises(RewardError, match="`l2`: expected 0 or more, found"):
         fit(many, START, l2=l2)
 
 
@@ -207,7 +207,7 @@ def test_where_the_way_up_leads_out_of_the_finite_it_is_said(monkeypatch):
     found = fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), l2=0.0)
     assert found.status is Status.INFINITE
     assert found.reward.theta[0] == pytest.approx(-30.0, abs=1e-3)
-    assert "endless detours outweigh the direct way" in found.status.advice
+    assert "endless detours outweigh the direct path" in found.status.advice
 
 
 def test_wandering_demonstrations_are_learnt_close_to_the_edge_of_the_finite():

@@ -228,8 +228,8 @@ def test_a_prior_on_other_cells_is_refused(navirl, files):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--bootstrap", "5"), "navirl: --bootstrap needs several participants, and all demonstrations are of p01"),
-        (("--cross-validate", "participant"), "navirl: --cross-validate needs several participants, and all"),
+        (("--bootstrap", "5"), "navirl: --bootstrap: expected several participants, found only p01"),
+        (("--cross-validate", "participant"), "navirl: --cross-validate: expected several participants, found"),
     ],
 )  # fmt: skip
 def test_what_one_participant_cannot_say_is_refused(navirl, files, words, message):
@@ -294,7 +294,7 @@ def test_what_is_read_is_not_replaced(navirl, files):
 
 def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monkeypatch):
     def nothing(*_args, **_options):
-        raise RewardError("--profile a_p: a better fit was found on the way")
+        raise RewardError("`profile` a_p: a better fit was found on the way")
 
     monkeypatch.setattr("navirl_cli.commands.fit.follow_profile", nothing)
     told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
@@ -331,7 +331,7 @@ def test_a_bias_too_large_to_be_taken_off_leaves_the_fit_as_it_is(navirl, files)
     one = read_demonstrations(files / "demos.json")[:1]
     write_json(Path("single.json"), "demonstrations", demonstrations_document(one, [], {}), force=False)
     told = navirl("fit", "single.json", "-o", "r.json", "--correct-bias", code=3).stderr
-    assert "navirl: --correct-bias: the demonstrations are too few for it: the correction would go too far" in told
+    assert "navirl: --correct-bias: too few demonstrations: the correction would go too far" in told
     assert values_of(read_json(Path("r.json"), "reward"), "bias_subtracted") == [None] * 4
 
 

@@ -102,7 +102,7 @@ def test_nothing_usable_is_known_trouble(navirl, study):
 def test_logs_are_not_overwritten_unless_forced(navirl, study):
     write(study / "logs", {"p2.mcap": b"mine"})
     result = navirl("import-study", "runs", "-o", "logs", code=1)
-    assert result.stderr == "navirl: logs/p2.mcap: exists already; give another name, or --force to replace it\n"
+    assert result.stderr == "navirl: logs/p2.mcap: exists already; choose another name, or replace it with --force\n"
     assert [path.name for path in (study / "logs").iterdir()] == ["p2.mcap"]
     navirl("import-study", "runs", "-o", "logs", "--force")
     assert (study / "logs" / "p2.mcap").stat().st_size > 10_000
@@ -111,7 +111,7 @@ def test_logs_are_not_overwritten_unless_forced(navirl, study):
 @pytest.mark.usefixtures("study")
 def test_a_folder_that_cannot_be_made_is_told(navirl):
     result = navirl("import-study", "runs", "-o", "runs.tar.gz", code=1)
-    assert result.stderr == "navirl: runs.tar.gz: cannot be made a folder: File exists; choose another with -o\n"
+    assert result.stderr == "navirl: runs.tar.gz: cannot be made a folder: File exists; choose another --output\n"
 
 
 def test_a_damaged_archive_is_refused(navirl, study):

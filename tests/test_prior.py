@@ -38,7 +38,7 @@ def test_the_regulariser_is_the_sum_of_squares_in_scales():
 
 @pytest.mark.parametrize("weight", [-0.1, np.nan, -np.inf])
 def test_a_weight_below_zero_is_refused(weight):
-    with pytest.raises(RewardError, match=f"the regulariser must not be negative, found --l2 {weight:g}"):
+    with pytest.raises(RewardError, match=f"`l2`: expected 0 or more, found {weight:g}"):
         Prior.l2(START.parameters, weight)
 
 
@@ -153,3 +153,9 @@ def test_what_only_the_prior_tells_is_told():
     # What tells nothing of them is the regulariser: it only says where they stay small.
     held = fit(evidence, START, 1.0)
     assert held.identified.tolist() == [True, True, False, False]
+
+
+def test_a_prior_of_other_parameters_is_refused():
+    evidence = evidence_of(make.drawn(SCENE, TRUTH, 2, seed=0))
+    with pytest.raises(RewardError, match="`prior`: expected one of c0, a_g, found one of 4 parameters"):
+        fit(evidence, Reward((-50.0, -0.5), START.terms[:2]), prior=Prior.gaussian(MEAN, COVARIANCE))

@@ -148,7 +148,7 @@ def test_progress_is_told_the_parameter_and_its_value(evidence, found):
 
 
 def test_an_unknown_parameter_is_refused(evidence, found):
-    with pytest.raises(RewardError, match=r"^--profile: unknown parameter c9; the reward has c0, a_g, a_p, sigma_p$"):
+    with pytest.raises(RewardError, match=r"^`profile`: unknown parameter c9; the reward has c0, a_g, a_p, sigma_p$"):
         profile(evidence, found, "c9")
 
 
@@ -157,9 +157,7 @@ def test_what_the_data_do_not_tell_is_not_profiled():
     evidence = evidence_of(make.drawn(nobody, TRUTH, 20, seed=3))
     found = fit(evidence, START, 0.0)
     assert not found.identified[3]
-    with pytest.raises(
-        RewardError, match="--profile sigma_p: the demonstrations do not tell this parameter; there is nothing to"
-    ):
+    with pytest.raises(RewardError, match="`profile` sigma_p: the demonstrations do not identify this parameter; add"):
         profile(evidence, found, "sigma_p")
 
 
@@ -168,7 +166,7 @@ def test_a_better_fit_on_the_way_is_said_with_the_way_there(evidence, found):
     theta = (found.reward.theta[0] - 8.0, *found.reward.theta[1:])
     fake = replace(found, reward=Reward(theta), objective=log_likelihood(evidence, Reward(theta)))
     with pytest.raises(
-        RewardError, match=r"--profile c0: a better fit was found on the way; fit again with --init c0=-"
+        RewardError, match=r"`profile` c0: a better fit was found on the way; fit again with `init` c0=-"
     ):
         profile(evidence, fake, "c0")
 

@@ -8,9 +8,16 @@ import pytest
 
 # At the end of the path: benchmarks and tests have modules of the same names.
 sys.path.append(str(Path(__file__).parent.parent / "benchmarks"))
+import factories as make
 import recovery
 from path_moments import PathMoments, path_moments
 from scenes import PUBLISHED
+
+from navirl_cli.errors import RewardError
+from navirl_cli.irl.bias import corrected
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.reward import Reward
 
 DATA_SETS = 6
 
@@ -52,6 +59,13 @@ def test_standard_errors_and_bias_by_theory_are_those_of_sampled_paths(moments):
     assert errors == pytest.approx(moments.standard_errors(recovery.DEMONSTRATIONS), rel=0.03)
     sampled = moments.bias(recovery.DEMONSTRATIONS)
     assert bias / errors == pytest.approx(sampled / errors, abs=0.05)
+
+
+def test_only_a_maximum_of_the_likelihood_can_be_corrected():
+    evidence = evidence_of(make.drawn(make.scene_on(make.open_grid(8, 5), [0, 2], [7, 2]), PUBLISHED, 3, seed=0))
+    found = fit(evidence, Reward((-50.0,), PUBLISHED.terms[:1]), l2=1.0)
+    with pytest.raises(RewardError, match="`correct_bias`: the bias is known only at a maximum of the likelihood"):
+        corrected(evidence, found)
 
 
 def test_theory_on_a_binomial_share():

@@ -1,82 +1,22 @@
-"""Terms and their sum: derivatives of every term, bounds, and a term that the package has never seen."""
+"""The sum of terms: against loops, in the goal, with a new term, and what is no reward."""
 
-from collections.abc import Sequence
 from math import exp, hypot
 
 import factories as make
 import numpy as np
 import oracles
 import pytest
+from toy_term import Egg
 
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import likelihood, log_likelihood
 from navirl_cli.irl.reward import PAPER_TERMS, Reward
-from navirl_cli.irl.scene import Scene
-from navirl_cli.irl.terms.term import Jet, Parameter, Term
-
-
-class Egg:
-    """A personal space that reaches further along x than across: a_e exp(-s_x dx^2 - s_y dy^2), summed over people."""
-
-    parameters = (
-        Parameter("a_e", "", -1e4, 1e4, 1.0, -4.0, "reward per step at a person's place"),
-        Parameter("s_x", "1/m^2", 1e-3, 1e3, 1.0, 1.0, "decay along x"),
-        Parameter("s_y", "1/m^2", 1e-3, 1e3, 1.0, 3.0, "decay along y"),
-    )
-
-    def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
-        a_e, s_x, s_y = theta
-        x2, y2 = np.moveaxis((scene.lattice.xy_m[:, None] - scene.people_m[None]) ** 2, 2, 0)
-        bump = np.exp(-s_x * x2 - s_y * y2)
-
-        def total(weight):
-            return (bump * weight).sum(axis=1)[:, None]
-
-        return Jet(
-            a_e * total(1.0),
-            [total(1.0), -a_e * total(x2), -a_e * total(y2)],
-            {
-                (0, 1): -total(x2),
-                (0, 2): -total(y2),
-                (1, 1): a_e * total(x2**2),
-                (1, 2): a_e * total(x2 * y2),
-                (2, 2): a_e * total(y2**2),
-            },
-        )
-
-
-TERMS: tuple[Term, ...] = (*PAPER_TERMS, Egg())
 
 
 @pytest.fixture(scope="module")
 def scene():
     return make.random_scene(np.random.default_rng(11), 9, 7, density=0.15, people=2)
-
-
-def spread(scene, array):
-    return np.broadcast_to(array, (scene.lattice.size, 8))
-
-
-@pytest.mark.parametrize("term", TERMS, ids=lambda term: type(term).__name__)
-@pytest.mark.parametrize("factor", [0.4, 1.0, 1.7])
-def test_derivatives_of_every_term(scene, term, factor):
-    theta = np.array([parameter.initial for parameter in term.parameters]) * factor
-    jet = term.on(scene, theta)
-
-    def value(at):
-        return spread(scene, term.on(scene, at).value)
-
-    def slopes(at):
-        return np.stack([spread(scene, first) for first in term.on(scene, at).first], axis=-1)
-
-    assert len(jet.first) == len(theta)
-    assert slopes(theta) == pytest.approx(oracles.derivative(value, theta), rel=1e-7, abs=1e-9)
-    bends = oracles.derivative(slopes, theta)
-    for j in range(len(theta)):
-        for k in range(len(theta)):
-            second = spread(scene, jet.second.get((min(j, k), max(j, k)), np.zeros((1, 1))))
-            assert second == pytest.approx(bends[..., j, k], rel=1e-7, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -164,7 +164,7 @@ def test_answers_stand_in_numbers_too(written, summary):
 def test_nothing_is_replaced_unasked(navirl, written):
     out, _ = written
     result = navirl("study", *LOGS, "-o", out, code=1)
-    assert "exists already; give another name, or --force to replace it" in result.stderr
+    assert "exists already; choose another name, or replace it with --force" in result.stderr
 
 
 def test_logs_without_cycles_are_refused(navirl, tmp_path):

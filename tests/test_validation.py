@@ -5,6 +5,7 @@ from dataclasses import replace
 import factories as make
 import numpy as np
 import pytest
+from toy_term import Egg
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import evidence_of
@@ -12,6 +13,7 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.validation import cross_validate
 
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
@@ -64,6 +66,14 @@ def test_leaving_one_out_against_a_loop(eight, validated):
         learnt_covariance = np.where(np.isfinite(learnt.covariance), learnt.covariance, 0.0)
         variance = found.information + found.information @ learnt_covariance @ found.information
         assert validated.deviation[k] == pytest.approx(np.sqrt(np.diag(variance)), rel=1e-6)
+
+
+def test_the_model_without_people_lacks_every_term_about_them():
+    evidence = evidence_of(mixed(TRUTH, 2, 2, seed=5))
+    start = Reward.named({}, (TERMS["step_length"], Egg()))
+    found = cross_validate(evidence, start, 1e-3, executor=Here()).log_likelihoods
+    assert (found["no person"] == found["shortest path"]).all()
+    assert (found["learnt"] != found["shortest path"]).all()
 
 
 def test_per_step_is_over_all_steps(validated):
@@ -129,7 +139,7 @@ def test_one_participant_cannot_be_left_out():
     evidence = evidence_of(make.by_participants(SCENE, TRUTH, 1, 3, seed=0))
     with pytest.raises(
         DemonstrationError,
-        match="--cross-validate needs several participants, and all demonstrations are of p01; add logs of others",
+        match="`cross_validate`: expected several participants, found only p01; add logs of others",
     ):
         cross_validate(evidence, START, 0.0)
 

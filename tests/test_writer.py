@@ -98,7 +98,7 @@ def test_refusals(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_text("old")
     with (
-        pytest.raises(ArtefactError, match=r"a\.mcap: exists already; give another name, or --force to replace it"),
+        pytest.raises(ArtefactError, match=r"a\.mcap: exists already; choose another name, or replace it with `force`"),
         LogWriter(path),
     ):
         pass

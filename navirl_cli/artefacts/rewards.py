@@ -15,7 +15,7 @@ from navirl_cli.errors import ArtefactError, NavirlError
 from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import Reward, terms_with
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.validation import Validation
 
@@ -142,11 +142,8 @@ def read_reward(path: Path) -> LearntReward:
     document = read_json(path, "reward")
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
-    expected = [parameter.name for parameter in Reward.named({}).parameters]
-    if names != expected:
-        raise ArtefactError(f"{path}: expected the parameters {', '.join(expected)}, found {', '.join(names)}")
     try:
-        reward = Reward.named(values)
+        reward = Reward.named(values, terms_with(names))
     except NavirlError as error:
         raise ArtefactError(f"{path}: {error}") from error
     covariance = [row(one) for one in document["covariance"]]

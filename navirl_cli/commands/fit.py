@@ -157,9 +157,9 @@ def fit(
     # What would be refused after the fit is refused before it.
     for name in profiles:
         number_of(start, name)
-    for option, wanted in (("--bootstrap", bootstrap), ("--cross-validate", cross_validate)):
+    for argument, wanted in (("bootstrap", bootstrap), ("cross_validate", cross_validate)):
         if wanted:
-            evidence.several_people(option)
+            evidence.several_people(argument)
     found = _learn(evidence, start, earlier, l2, Method(method))
     lost: list[str] = []
     with _kept(lost):

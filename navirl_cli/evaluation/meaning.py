@@ -77,8 +77,8 @@ def meanings(
     """Everything that can be said of a reward in metres.
 
     Args:
-        reward: Of the paper's terms.
-        covariance: (4, 4), NaN where there is none.
+        reward: What was learnt; quantities of parameters that it does not have are left out.
+        covariance: (k, k), NaN where there is none.
         resolution_m: Side of the cells that it was learnt on, m.
         distance_m: At which people were passed, centre to centre, m; NaN where nobody was.
         rng: Source of randomness of the intervals.
@@ -118,6 +118,8 @@ def meanings(
     found = []
     for text, unit, on, value in wanted:
         lower = upper = float("nan")
+        if not set(on) <= set(names):
+            continue
         if all(told[names.index(name)] for name in on):
             drawn = [value(dict(zip(names, row, strict=True))) for row in draws]
             lower, upper = (float(edge) for edge in np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))

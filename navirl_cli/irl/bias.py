@@ -26,7 +26,7 @@ from navirl_cli.irl.status import Status
 
 #: Step of the difference quotients of I, in standard errors.
 STEP = 0.02
-TOO_FEW = "the demonstrations are too few for it: the correction would go too far"
+TOO_FEW = "too few demonstrations: the correction would go too far"
 
 
 def first_order_bias(evidence: Evidence, reward: Reward, told: NDArray[np.bool_]) -> FloatArray:
@@ -69,21 +69,23 @@ def corrected(evidence: Evidence, found: Fit) -> Fit:
             demonstrations are too few for a correction to first order.
     """
     if found.prior is not None or found.l2 > PAPER_L2 or found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
-        raise RewardError("--correct-bias: known for maxima of the likelihood only, without a prior or a larger --l2")
+        raise RewardError(
+            "`correct_bias`: the bias is known only at a maximum of the likelihood, without `prior` or a larger `l2`"
+        )
     told = np.isfinite(found.standard_errors)
     try:
         bias = first_order_bias(evidence, found.reward, told)
         reward = Reward(tuple((np.array(found.reward.theta) - bias).tolist()), found.reward.terms)
         value = log_likelihood(evidence, reward)
     except RewardError as error:
-        raise RewardError(f"--correct-bias: {TOO_FEW} (beyond the bounds of a reward)") from error
+        raise RewardError(f"`correct_bias`: {TOO_FEW} (beyond the bounds of the reward)") from error
     large = [
         parameter.name
         for parameter, one, spread, tells in zip(reward.parameters, bias, found.standard_errors, told, strict=True)
         if tells and abs(one) > spread
     ]
     if large:
-        raise RewardError(f"--correct-bias: {TOO_FEW} (by more than a standard error in {', '.join(large)})")
+        raise RewardError(f"`correct_bias`: {TOO_FEW} (by more than a standard error in {', '.join(large)})")
     regulariser = Prior.l2(reward.parameters, found.l2).log_density(np.array(reward.theta))
     return replace(found, reward=reward, log_likelihood=value, objective=value + regulariser, bias=bias)
 

@@ -73,7 +73,7 @@ def bootstrap(
     Raises:
         DemonstrationError: There is one participant only, or fewer than two replicates gave a fit.
     """
-    names = evidence.several_people("--bootstrap")
+    names = evidence.several_people("bootstrap")
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(len(names), np.full(len(names), 1 / len(names)), size=count)
     member = np.array([[name == participant for participant in evidence.participants] for name in names], dtype=int)
@@ -85,7 +85,9 @@ def bootstrap(
             progress(len(results), "")
     fits = [result for result in results if result is not None]
     if len(fits) < 2:
-        raise DemonstrationError(f"--bootstrap: of {count} draws of participants fewer than two could be learnt from")
+        raise DemonstrationError(
+            f"`bootstrap`: fewer than two of {count} draws of participants gave a fit; add demonstrations"
+        )
     return Bootstrap(
         theta=np.array([np.where(again.identified, again.reward.theta, np.nan) for again in fits]),
         failed=count - len(fits),

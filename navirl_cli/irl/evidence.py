@@ -65,16 +65,18 @@ class Evidence:
         """Participants of whose demonstrations there is a step, in order of their names."""
         return sorted({self.participants[owner] for owner in self.owners})
 
-    def several_people(self, option: str) -> list[str]:
+    def several_people(self, argument: str) -> list[str]:
         """The participants, where there are several.
 
+        Args:
+            argument: The name of what needs several, for the message.
+
         Raises:
-            DemonstrationError: There is one only; the option needs more.
+            DemonstrationError: There is only one.
         """
         if len(self.people) < 2:
             raise DemonstrationError(
-                f"{option} needs several participants, and all demonstrations are of {self.people[0]}; "
-                "add logs of others"
+                f"`{argument}`: expected several participants, found only {self.people[0]}; add logs of others"
             )
         return self.people
 
@@ -118,7 +120,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
         DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
     """
     if not demonstrations:
-        raise DemonstrationError("no demonstration to learn from: check --condition, --cycle and --only-corrected")
+        raise DemonstrationError("no demonstration to learn from: check `condition`, `cycle` and `only_corrected`")
     steps: dict[Scene, list[tuple[IntArray, IntArray, int]]] = {}
     scenes = scenes_of(demonstrations)
     for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):

@@ -119,10 +119,9 @@ def fit(
 
     Raises:
         InfinitePartitionError: The partition function is infinite at the initial parameters.
-        RewardError: l2 is negative, or a fixed parameter unknown.
+        RewardError: l2 is negative, the prior is of other parameters, or a fixed parameter is unknown.
     """
-    regulariser = Prior.l2(initial.parameters, l2).where(None if prior is None else ~prior.known)
-    objective = Objective(evidence, initial, regulariser if prior is None else regulariser + prior, regulariser)
+    objective = _objective(evidence, initial, l2, prior)
     first = objective(objective.to_units(initial.theta))
     if not np.isfinite(first.value):
         log_likelihood(evidence, initial)  # raises with the reason
@@ -145,6 +144,18 @@ def fit(
     search = _by_adam if method is Method.ADAM else _by_newton
     found = search(objective, starts, told & ~held, count)
     return _as_fit(objective, found, first, told, held, (method, l2, prior))
+
+
+def _objective(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> Objective:
+    """What is maximised."""
+    regulariser = Prior.l2(initial.parameters, l2)
+    if prior is None:
+        return Objective(evidence, initial, regulariser, regulariser)
+    if len(prior.shift) != len(initial.theta):
+        names = ", ".join(parameter.name for parameter in initial.parameters)
+        raise RewardError(f"`prior`: expected one of {names}, found one of {len(prior.shift)} parameters")
+    regulariser = regulariser.where(~prior.known)
+    return Objective(evidence, initial, regulariser + prior, regulariser)
 
 
 def _as_fit(

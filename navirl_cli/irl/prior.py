@@ -33,7 +33,7 @@ class Prior(ByContent):
             RewardError: The weight is negative or no number.
         """
         if not weight >= 0:
-            raise RewardError(f"the regulariser must not be negative, found --l2 {weight:g}")
+            raise RewardError(f"`l2`: expected 0 or more, found {weight:g}")
         scale = np.array([parameter.scale for parameter in parameters])
         return Prior(np.diag(weight / scale**2), np.zeros(len(scale)))
 
@@ -64,10 +64,8 @@ class Prior(ByContent):
         known: NDArray[np.bool_] = (np.abs(self.precision).max(axis=1) > 0).astype(bool)
         return known
 
-    def where(self, mask: NDArray[np.bool_] | None) -> "Prior":
-        """What it knows of some parameters, which it must know apart from the others; all where there is no mask."""
-        if mask is None:
-            return self
+    def where(self, mask: NDArray[np.bool_]) -> "Prior":
+        """What it knows of some parameters, which must be independent of the others."""
         return Prior(self.precision * np.outer(mask, mask), self.shift * mask, self.constant)
 
     def __add__(self, other: "Prior") -> "Prior":

@@ -77,12 +77,10 @@ def profile(
     j = number_of(found.reward, name)
     if found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
         raise RewardError(
-            f"--profile {name}: the fit is not at its maximum ({found.status.value}); nothing can be compared"
+            f"`profile` {name}: the fit did not reach its maximum ({found.status.value}), so there is no reference"
         )
     if not found.identified[j]:
-        raise RewardError(
-            f"--profile {name}: the demonstrations do not tell this parameter; there is nothing to profile"
-        )
+        raise RewardError(f"`profile` {name}: the demonstrations do not identify this parameter; add some that do")
     walker = _Walker(evidence, found, j, progress)
     ends = [walker.end(side, fall_at(level)) for side in (-1, 1)]
     values = np.array(sorted(value for value, (relative, _) in walker.seen.items() if isfinite(relative)))
@@ -99,7 +97,7 @@ def number_of(reward: Reward, name: str) -> int:
     """
     names = [parameter.name for parameter in reward.parameters]
     if name not in names:
-        raise RewardError(f"--profile: unknown parameter {name}; the reward has {', '.join(names)}")
+        raise RewardError(f"`profile`: unknown parameter {name}; the reward has {', '.join(names)}")
     return names.index(name)
 
 
@@ -130,7 +128,7 @@ class _Walker:
         if relative > BETTER:
             values = ",".join(f"{p.name}={x:.6g}" for p, x in zip(reward.parameters, reward.theta, strict=True))
             raise RewardError(
-                f"--profile {self.parameter.name}: a better fit was found on the way; fit again with --init {values}"
+                f"`profile` {self.parameter.name}: a better fit was found on the way; fit again with `init` {values}"
             )
         self.seen[value] = relative, reward
         if self.progress is not None:

@@ -1,6 +1,6 @@
 """A reward: terms with their parameters' values, put together on a scene."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,18 +8,35 @@ import numpy as np
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.scene import Scene
-from navirl_cli.irl.terms.deviation import Deviation
-from navirl_cli.irl.terms.personal_space import PersonalSpace
-from navirl_cli.irl.terms.step_length import StepLength
+from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.terms.term import Jet, Parameter, Term
 
-#: The reward of the paper (Eqs. 11-13).
-PAPER_TERMS: tuple[Term, ...] = (StepLength(), Deviation(), PersonalSpace())
+#: The reward of the paper (Eq. 13).
+PAPER_TERMS: tuple[Term, ...] = (TERMS["step_length"], TERMS["deviation"], TERMS["personal_space"])
 
 
 def parameters_of(terms: Iterable[Term]) -> tuple[Parameter, ...]:
     """All parameters of a sum of terms, in order."""
     return tuple(parameter for term in terms for parameter in term.parameters)
+
+
+def terms_with(names: Sequence[str]) -> tuple[Term, ...]:
+    """The terms of TERMS whose parameters have these names, in this order.
+
+    Raises:
+        RewardError: The names are not those of one or more terms, each once.
+    """
+    known = {tuple(parameter.name for parameter in term.parameters): term for term in TERMS.values()}
+    found: list[Term] = []
+    left = tuple(names)
+    while left:
+        first = next((own for own in known if left[: len(own)] == own and known[own] not in found), None)
+        if first is None:
+            groups = "; ".join(", ".join(own) for own in known)
+            raise RewardError(f"expected the parameters of known terms ({groups}), found {', '.join(names)}")
+        found.append(known[first])
+        left = left[len(first) :]
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class Scene:
 
     @cached_property
     def deviation_m(self) -> FloatArray:
-        """(n,) distance d(s) of every cell's centre to the nearest cell of the nominal path, m (Eq. 12)."""
+        """(n,) distance d(s) of every cell's centre to the nearest cell of the nominal path, m (Eq. 11)."""
         from scipy.ndimage import distance_transform_edt
 
         away = np.ones(self.lattice.grid.shape, dtype=bool)

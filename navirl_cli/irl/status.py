@@ -19,19 +19,19 @@ class Status(StrEnum):
 
 
 _ADVICE = {
-    Status.CONVERGED: "no step raises the likelihood any more",
+    Status.CONVERGED: "no step increases the likelihood further",
     Status.STOPPED_EARLY: (
-        "the likelihood still rises, so that these numbers are not the optimum: it may lie at infinity; "
-        "add demonstrations or a larger --l2, or go on with --init"
+        "the likelihood still increases: these values are not the optimum, which may lie at infinity; "
+        "add demonstrations, choose a larger `l2`, or continue with `init`"
     ),
     Status.ON_BOUND: "a parameter ended on its bound, where it has no standard error; more demonstrations may free it",
     Status.NOT_IDENTIFIED: (
-        "the demonstrations do not tell every parameter: the numbers marked so mean nothing by themselves; "
-        "add demonstrations that tell them (people near the path, detours from the nominal path)"
+        "the demonstrations do not identify every parameter: the values marked so have no meaning by themselves; "
+        "add demonstrations that identify them (people near the path, detours from the nominal path)"
     ),
     Status.INFINITE: (
-        "the likelihood rises up to parameters under which endless detours outweigh the direct way, where there is no "
-        "policy: the demonstrations wander more than this reward can explain; check that their paths end at the goal, "
-        "or start from a more negative c0 with --init"
+        "the likelihood increases up to parameters at which endless detours outweigh the direct path and no policy "
+        "exists: the demonstrated paths wander more than this reward can explain; check that they end at the goal, "
+        "or start from a more negative c0 with `init`"
     ),
 }

@@ -14,9 +14,8 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.terms.personal_space import PersonalSpace
 from navirl_cli.irl.terms.step_length import StepLength
-from navirl_cli.irl.terms.term import Parameter
+from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.parallel import map_in_order
 
 
@@ -92,7 +91,7 @@ def cross_validate(
         DemonstrationError: There is one participant only.
         InfinitePartitionError: A learnt reward has no policy in a left-out scene.
     """
-    names = evidence.several_people("--cross-validate")
+    names = evidence.several_people("cross_validate")
     results = []
     for result in map_in_order(partial(_leave_out, evidence, _models(initial), l2), names, executor):
         results.append(result)
@@ -117,12 +116,12 @@ def _models(initial: Reward) -> dict[str, Reward]:
     """The reward and what it is compared with, by name; the first is the reward."""
     return {
         "learnt": initial,
-        "no person": _without(initial, lambda term: not isinstance(term, PersonalSpace)),
-        "shortest path": _without(initial, lambda term: isinstance(term, StepLength)),
+        "no person": _with(initial, lambda term: not term.about_people),
+        "shortest path": _with(initial, lambda term: isinstance(term, StepLength)),
     }
 
 
-def _without(initial: Reward, keep: Callable[[object], bool]) -> Reward:
+def _with(initial: Reward, keep: Callable[[Term], bool]) -> Reward:
     """The reward with some of its terms."""
     theta: list[float] = []
     at = 0

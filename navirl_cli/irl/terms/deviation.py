@@ -1,4 +1,4 @@
-"""The cost of leaving the nominal path: a_g d(s)^2 (Eq. 12)."""
+"""The cost of leaving the nominal path: a_g d(s)^2 (second part of Eq. 11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,14 +15,15 @@ class Deviation:
         Parameter(
             "a_g",
             "1/m^2",
-            -1e4,
-            0.0,
-            1.0,
-            -0.01,
-            "reward per step and squared metre from the nominal path",
+            lower=-1e4,
+            upper=0.0,
+            scale=1.0,
+            initial=-0.01,
+            meaning="reward per step and squared metre from the nominal path",
             restarts=(-1.0,),  # from the study's start Newton's method alone sticks at 0 on some of its data
         ),
     )
+    about_people = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivative by cell."""

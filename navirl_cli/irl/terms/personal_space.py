@@ -1,4 +1,4 @@
-"""The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 13)."""
+"""The personal space: sum over people of a_p exp(-sigma_p |s - s_p|^2) (Eq. 12)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,18 +14,21 @@ class PersonalSpace:
     """Each step costs for being near to people; several people add up."""
 
     parameters = (
-        Parameter("a_p", "", -1e4, 1e4, 1.0, -5.0, "reward per step at a person's place"),
+        Parameter(
+            "a_p", "", lower=-1e4, upper=1e4, scale=1.0, initial=-5.0, meaning="reward per step at a person's place"
+        ),
         Parameter(
             "sigma_p",
             "1/m^2",
-            1e-3,
-            1e3,
-            1.0,
-            2.0,
-            "decay of the personal space with squared distance",
+            lower=1e-3,
+            upper=1e3,
+            scale=1.0,
+            initial=2.0,
+            meaning="decay of the personal space with squared distance",
             restarts=(8.0,),  # a narrow space; wide ones are found from the study's start
         ),
     )
+    about_people = True
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives by cell."""

@@ -1,4 +1,4 @@
-"""The cost of way: c0 |s - s'| (Eq. 11)."""
+"""The cost of path length: c0 |s - s'| (first part of Eq. 11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,10 @@ from navirl_cli.irl.terms.term import Jet, Parameter
 class StepLength:
     """Each step costs its length."""
 
-    parameters = (Parameter("c0", "1/m", -1e4, -1e-2, 10.0, -50.0, "reward per metre driven"),)
+    parameters = (
+        Parameter("c0", "1/m", lower=-1e4, upper=-1e-2, scale=10.0, initial=-50.0, meaning="reward per metre driven"),
+    )
+    about_people = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivative by move."""

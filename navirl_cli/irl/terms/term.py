@@ -43,11 +43,15 @@ class Jet:
 
 
 class Term(Protocol):
-    """A summand of the reward."""
+    """A summand of the reward: a frozen dataclass, so that it equals its copies."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The term's parameters in order."""
+        """The term's parameters in order. No two terms share a name."""
+
+    @property
+    def about_people(self) -> bool:
+        """Whether it depends on people, so that a model without people lacks it."""
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives with respect to the term's parameters, in reward per step."""
