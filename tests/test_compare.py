@@ -9,18 +9,9 @@ import pytest
 from scipy import stats
 
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.evaluation.compare import (
-    AVOIDANCE,
-    DRIVEN,
-    KINDS,
-    LEARNT,
-    NOMINAL,
-    ON_GRID,
-    PERSON_RADIUS_M,
-    compare,
-    group_of,
-)
+from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, KINDS, LEARNT, NOMINAL, ON_GRID, PERSON_RADIUS_M, compare
 from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import group_of
 from navirl_cli.evaluation.metrics import line_values
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m

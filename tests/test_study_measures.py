@@ -6,7 +6,9 @@ import oracles
 import pytest
 
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.study.measures import LEAVES_M, by_participant, groups_of, mean_and_spread, measured, onset_m
+from navirl_cli.evaluation.groups import mean_and_spread
+from navirl_cli.evaluation.metrics import LEAVES_M, onset_m
+from navirl_cli.study.measures import by_participant, groups_of, measured
 
 NOMINAL = np.array([[0.0, 0.0], [10.0, 0.0]])
 PERSON = np.array([[6.0, 0.3]])

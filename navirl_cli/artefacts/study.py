@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from navirl_cli.artefacts.store import number
-from navirl_cli.evaluation.compare import GroupMetrics
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Values
 from navirl_cli.irl.fit import Fit
 from navirl_cli.study.claims import Claim

@@ -25,10 +25,11 @@ from navirl_cli.commands.shared import (
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import ENDINGS, Format, formatted
 from navirl_cli.errors import ArtefactError, DemonstrationError
-from navirl_cli.evaluation.compare import FIELDS, compare
+from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.groups import FIELDS
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.pairs import pairs_of
+from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import check_writable, replacing
 from navirl_cli.irl.reward import Reward

@@ -1,11 +1,14 @@
 """Two groups of paths compared within participants: difference, interval, test and effect size."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.groups import Driven, by_participant
+from navirl_cli.evaluation.metrics import Metric
 
 LEVEL = 0.95
 RESAMPLES = 9999
@@ -59,6 +62,36 @@ def paired(one: Mapping[str, float], other: Mapping[str, float], rng: np.random.
     p_value, biserial = _signed_ranks(values)
     dz = mean / spread if spread > 0 else float("nan")
     return Paired(both, mean, lower, upper, p_value, dz, biserial)
+
+
+def pairs_of(
+    rows: Sequence[Driven], one: str, other: str, metrics: Sequence[Metric], rng: np.random.Generator
+) -> dict[str, Paired]:
+    """Compare two groups; a participant counts with the mean over their demonstrations of a group.
+
+    Args:
+        rows: What was measured.
+        one: Name of a group.
+        other: Name of another.
+        metrics: To compare.
+        rng: Source of randomness.
+
+    Returns:
+        By metric: one less other. Metrics of which no participant has values in both groups are not in it.
+
+    Raises:
+        DemonstrationError: A group does not exist.
+    """
+    known = list(dict.fromkeys(row.group for row in rows))
+    for name in (one, other):
+        if name not in known:
+            raise DemonstrationError(f"--pair: no group is called {name!r}; there are {', '.join(map(repr, known))}")
+    found = {
+        metric.name: paired(by_participant(rows, one, metric.name), by_participant(rows, other, metric.name), rng)
+        for metric in metrics
+        if any(metric.name in row.values for row in rows)
+    }
+    return {name: result for name, result in found.items() if result.n}
 
 
 def _interval(values: FloatArray, rng: np.random.Generator) -> tuple[float, float]:

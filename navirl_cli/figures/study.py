@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.compare import by_group
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
 from navirl_cli.figures.conditions import draw_path_panels

@@ -8,8 +8,9 @@ import numpy as np
 
 from navirl_cli.artefacts.store import Input, number
 from navirl_cli.documents.tables import Format, Table, formatted
-from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison, GroupMetrics
+from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison
 from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity

@@ -6,12 +6,13 @@ from statistics import median
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.documents.tables import Table
+from navirl_cli.evaluation.groups import mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt
-from navirl_cli.study.measures import GroupProperties, mean_and_spread
+from navirl_cli.study.measures import GroupProperties
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
 from navirl_cli.study.questionnaire import Shares
 

@@ -6,9 +6,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric
+from navirl_cli.evaluation.groups import mean_and_spread
+from navirl_cli.evaluation.metrics import LEAVES_M, PAPER_METRICS, Metric
 from navirl_cli.study.learning import Learnt
-from navirl_cli.study.measures import LEAVES_M, Measured, by_participant, mean_and_spread
+from navirl_cli.study.measures import Measured, by_participant
 
 SECOND_CYCLE, JOYSTICK, REPLAY = "force, cycle 2", "joystick", "replay of the learnt policy"
 #: Groups of a robot that only avoids obstacles: as an imported study calls them, and as a log that says no more.

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.arrays import ByContent
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, nominal_of, summary_of
-from navirl_cli.evaluation.metrics import Values, paper_values
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, nominal_of
+from navirl_cli.evaluation.groups import GroupMetrics, by_group, group_of, mean_and_spread, summary_of
+from navirl_cli.evaluation.metrics import Values, onset_m, paper_values
 from navirl_cli.irl.scene import Scene, scenes_of
-
-#: A path has left the nominal one where it is farther from it than this, m: a cell and a half.
-LEAVES_M = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,31 +56,6 @@ def _measured(one: Demonstration, scene: Scene) -> Measured:
     )
 
 
-def onset_m(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray) -> float:
-    """How far before the first person a path leaves the nominal one, along it.
-
-    Args:
-        line_m: (n, 2) m, the path.
-        nominal_m: (k, 2) m.
-        people_m: (p, 2) m.
-
-    Returns:
-        m; negative where it leaves behind the first person; NaN where there is nobody, or the path never leaves the
-        nominal one by LEAVES_M, or starts away from it.
-    """
-    from shapely import LineString, distance, line_locate_point, points
-
-    nominal = LineString(nominal_m)
-    away = distance(points(line_m), nominal)
-    if len(people_m) == 0 or away[0] > LEAVES_M or away.max() <= LEAVES_M:
-        return float("nan")
-    left = int(np.argmax(away > LEAVES_M))
-    share = (LEAVES_M - away[left - 1]) / (away[left] - away[left - 1])
-    where = line_m[left - 1] + share * (line_m[left] - line_m[left - 1])
-    person = float(line_locate_point(nominal, points(people_m)).min())
-    return person - float(line_locate_point(nominal, points(where)))
-
-
 @dataclass(frozen=True, eq=False)
 class GroupProperties(ByContent):
     """Properties of the paths of one group, over its trials with people."""
@@ -122,13 +95,6 @@ def _properties(group: str, rows: Sequence[Measured]) -> GroupProperties:
         int(np.isfinite([row.onset_m for row in rows]).sum()),
         len({row.participant for row in rows}),
     )
-
-
-def mean_and_spread(values: Iterable[float]) -> tuple[float, float]:
-    """Mean and sample standard deviation of the finite values; NaN where they are too few."""
-    known = np.array([value for value in values if np.isfinite(value)])
-    mean = float(known.mean()) if len(known) else float("nan")
-    return mean, float(known.std(ddof=1)) if len(known) > 1 else float("nan")
 
 
 def by_participant(rows: Iterable[Measured], group: str, value: Callable[[Measured], float]) -> Mapping[str, float]:
