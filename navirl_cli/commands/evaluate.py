@@ -162,7 +162,7 @@ def evaluate(
             fields=fields,
             progress=lambda done, _all: update(done, ""),
         )
-    compared = [(one, other, pairs_of(result.driven, one, other, metrics, rng)) for one, other in pairs]
+    compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
     ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
     inputs = [Input.of(path) for path in (demos, *rewards)]
     content = document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)

@@ -1,7 +1,7 @@
 """Demonstrated paths against learnt ones and against paths that know nothing of people's wishes."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, draw
-from navirl_cli.evaluation.groups import Driven, GroupMetrics, by_group, group_of, summary_of
-from navirl_cli.evaluation.metrics import METRICS, Values, line_values
+from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
+from navirl_cli.evaluation.metrics import METRICS, line_values
 from navirl_cli.evaluation.motion import contact_values, motion_values
 from navirl_cli.evaluation.policy_paths import nearness
 from navirl_cli.irl.reward import Reward
@@ -35,7 +35,7 @@ class Comparison:
     """All metrics of a set of demonstrations."""
 
     groups: tuple[GroupMetrics, ...]
-    driven: tuple[Driven, ...]
+    rows: tuple[Measured, ...]
     #: What could not be measured, and why.
     notes: tuple[str, ...]
 
@@ -66,21 +66,19 @@ def compare(
         SceneError: A demonstration's scene has no way.
         InfinitePartitionError: A reward has no policy in a scene.
     """
-    lines: dict[tuple[str, str], list[tuple[str, Values]]] = {}
     learnt: dict[tuple[str, str], list[tuple[Drawn, dict[str, FloatArray]]]] = {}
     known: dict[tuple[str, int, float], Drawn] = {}
-    rows: list[Driven] = []
+    rows: list[Measured] = []
     notes: list[str] = []
     for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
         group = group_of(one, fields)
         paths = _lines(one, scene, notes)
         nominal = paths[NOMINAL]
-        for kind, line in paths.items():
-            values = line_values(line, nominal, one.people_m, one.robot_radius_m)
-            if kind == DRIVEN:
-                values = {**values, **motion_values(one), **contact_values(one)}
-                rows.append(Driven(one.id, one.participant, group, values))
-            lines.setdefault((group, kind), []).append((one.participant, values))
+        found = {
+            kind: dict(line_values(line, nominal, one.people_m, one.robot_radius_m)) for kind, line in paths.items()
+        }
+        found[DRIVEN] |= {**motion_values(one), **contact_values(one)}
+        rows.append(Measured(one.id, one.participant, group, found))
         for name, reward in rewards.items():
             key = (name, id(scene), one.robot_radius_m)
             if key not in known:
@@ -90,7 +88,11 @@ def compare(
             learnt.setdefault((group, kind), []).append((known[key], near))
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    groups = [_with_interval(summary_of(*key, [values for _, values in own]), own) for key, own in lines.items()]
+    groups = [
+        summary_of(group, kind, [row for row in rows if row.group == group])
+        for group in dict.fromkeys(row.group for row in rows)
+        for kind in dict.fromkeys(kind for row in rows if row.group == group for kind in row.values)
+    ]
     groups += [_learnt(group, kind, members) for (group, kind), members in learnt.items()]
     order = list(by_group(demonstrations, fields))
     groups.sort(key=lambda row: (order.index(row.group), _place(row.kind), row.kind))
@@ -120,23 +122,6 @@ def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict
     except SceneError as error:
         notes.append(f"{demonstration.id}: no path around the people as obstacles: {error}")
     return lines
-
-
-def _with_interval(row: GroupMetrics, measured: Sequence[tuple[str, Values]]) -> GroupMetrics:
-    """A group with intervals of its means over participants; values come with whose they are."""
-    from scipy.stats import t
-
-    found = {}
-    for name in row.mean:
-        own: dict[str, list[float]] = {}
-        for participant, values in measured:
-            if np.isfinite(values[name]):
-                own.setdefault(participant, []).append(values[name])
-        means = np.array([np.mean(known) for known in own.values()])
-        several = len(means) > 1
-        half = t.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)) if several else np.nan
-        found[name] = float(half)
-    return replace(row, half_interval=found)
 
 
 def _learnt(group: str, kind: str, members: Sequence[tuple[Drawn, dict[str, FloatArray]]]) -> GroupMetrics:

@@ -1,14 +1,16 @@
 """Groups of demonstrations: who belongs to which, and mean and spread over a group or over participants."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.evaluation.metrics import METRICS, Values
+from navirl_cli.evaluation.metrics import Values
 
+#: Of all intervals.
+LEVEL = 0.95
 #: By what demonstrations can be grouped.
 FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
     "condition": lambda one: one.condition.value,
@@ -36,16 +38,28 @@ class GroupMetrics(ByContent):
     #: Of other paths: half the 95 % interval of the mean, participants counting with their own means (Student); NaN
     #: for one participant.
     half_interval: Values = field(default_factory=dict)
+    #: Of other paths: number of participants, and of paths with a value by metric.
+    participants: int = 0
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    def expected(self, name: str) -> float:
+        """Mean of a metric, the exact one where there is one; NaN where there is none."""
+        return self.exact.get(name, self.mean.get(name, float("nan")))
+
+    def monte_carlo_error(self, name: str) -> float:
+        """Standard error of :meth:`expected` of paths that were drawn; 0 where it is exact."""
+        return 0.0 if name in self.exact else self.error.get(name, float("nan"))
 
 
 @dataclass(frozen=True, eq=False)
-class Driven(ByContent):
-    """What was measured of one demonstration as driven."""
+class Measured(ByContent):
+    """What was measured of one demonstration's paths."""
 
     id: str
     participant: str
     group: str
-    values: Values
+    #: By type of path, then by metric.
+    values: Mapping[str, Values]
 
 
 def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
@@ -70,30 +84,54 @@ def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
     return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
 
 
-def summary_of(group: str, kind: str, measured: Iterable[Values]) -> GroupMetrics:
-    """Mean and standard deviation over the paths that have a value (distance to people needs people)."""
-    mean, spread = {}, {}
-    paths = list(measured)
-    for metric in METRICS:
-        values = np.array([one[metric.name] for one in paths if metric.name in one])
-        values = values[np.isfinite(values)]
-        if any(metric.name in one for one in paths):
-            mean[metric.name] = float(values.mean()) if len(values) else float("nan")
-            spread[metric.name] = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
-    return GroupMetrics(group, kind, len(paths), mean, spread)
+def summary_of(group: str, kind: str, rows: Iterable[Measured]) -> GroupMetrics:
+    """Mean, standard deviation and interval over a group's paths of one type, those with a value each.
+
+    Args:
+        group: Its name.
+        kind: The type of path.
+        rows: What was measured of the group; demonstrations without this type of path do not count.
+    """
+    paths = [row for row in rows if kind in row.values]
+    mean, std, half, counts = {}, {}, {}, {}
+    for name in dict.fromkeys(name for row in paths for name in row.values[kind]):
+        values = [value for row in paths if np.isfinite(value := row.values[kind].get(name, np.nan))]
+        mean[name], std[name] = mean_and_spread(values)
+        half[name] = student_half_width(by_participant(paths, kind, name).values())
+        counts[name] = len(values)
+    people = len({row.participant for row in paths})
+    return GroupMetrics(group, kind, len(paths), mean, std, half_interval=half, participants=people, counts=counts)
+
+
+def by_participant(rows: Iterable[Measured], kind: str, name: str) -> dict[str, float]:
+    """Mean of a metric over each participant's finite values; participants without one are left out.
+
+    Args:
+        rows: What was measured.
+        kind: The type of path.
+        name: The metric.
+    """
+    values: dict[str, list[float]] = {}
+    for row in rows:
+        value = row.values.get(kind, {}).get(name, np.nan)
+        if np.isfinite(value):
+            values.setdefault(row.participant, []).append(value)
+    return {participant: float(np.mean(own)) for participant, own in values.items()}
 
 
 def mean_and_spread(values: Iterable[float]) -> tuple[float, float]:
-    """Mean and sample standard deviation of the finite values; NaN where they are too few."""
+    """Mean and sample standard deviation (n - 1) of the finite values; NaN for none, and for one."""
     known = np.array([value for value in values if np.isfinite(value)])
     mean = float(known.mean()) if len(known) else float("nan")
     return mean, float(known.std(ddof=1)) if len(known) > 1 else float("nan")
 
 
-def by_participant(rows: Sequence[Driven], group: str, name: str) -> dict[str, float]:
-    """Mean of a metric over each participant's finite values."""
-    values: dict[str, list[float]] = {}
-    for row in rows:
-        if row.group == group and np.isfinite(row.values.get(name, np.nan)):
-            values.setdefault(row.participant, []).append(row.values[name])
-    return {participant: float(np.mean(own)) for participant, own in values.items()}
+def student_half_width(values: Iterable[float]) -> float:
+    """Half the width of Student's 95 % interval of the mean of finite values; NaN for fewer than two."""
+    from scipy.special import stdtrit  # scipy.stats holds the same quantile behind an import of half a second
+
+    known = [value for value in values if np.isfinite(value)]
+    if len(known) < 2:
+        return float("nan")
+    _, std = mean_and_spread(known)
+    return float(stdtrit(len(known) - 1, (1 + LEVEL) / 2) * std / np.sqrt(len(known)))

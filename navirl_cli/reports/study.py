@@ -131,7 +131,7 @@ def claims_lines(claims: Sequence[Claim], mark: str = "") -> list[str]:
     """
     lines = []
     for claim in claims:
-        said = "; ".join(f"{one.what} {signed(one.mean, one.unit)}" for one in claim.differences)
+        said = "; ".join(f"{one.what} {signed(one.paired.mean, one.unit)}" for one in claim.differences)
         lines.append(f"{mark}{claim.verdict.value}{mark}: {claim.text} ({claim.asked}: {said}.)")
     return lines
 
