@@ -9,18 +9,9 @@ import pytest
 from scipy import stats
 
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.evaluation.compare import (
-    AVOIDANCE,
-    DRIVEN,
-    KINDS,
-    LEARNT,
-    NOMINAL,
-    ON_GRID,
-    PERSON_RADIUS_M,
-    compare,
-    group_of,
-)
+from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, KINDS, LEARNT, NOMINAL, ON_GRID, PERSON_RADIUS_M, compare
 from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import group_of
 from navirl_cli.evaluation.metrics import line_values
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
@@ -81,10 +72,10 @@ def test_one_path_has_no_spread():
 
 def test_what_was_driven_is_listed_by_demonstration():
     comparison = run()
-    assert [(row.id, row.participant, row.group) for row in comparison.driven] == [
+    assert [(row.id, row.participant, row.group) for row in comparison.rows] == [
         ("p1/1", "p1", "force, cycle 2"), ("p1/2", "p1", "force, cycle 2"), ("p1/3", "p1", "joystick")
     ]  # fmt: skip
-    assert comparison.driven[1].values["length_m"] == pytest.approx(oracles.length_by_steps(TRIALS[1].xy_m))
+    assert comparison.rows[1].values[DRIVEN]["length_m"] == pytest.approx(oracles.length_by_steps(TRIALS[1].xy_m))
 
 
 def test_poses_beside_the_centres_change_what_was_driven_but_not_what_is_on_the_grid():

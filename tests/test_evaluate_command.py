@@ -80,7 +80,7 @@ def test_pairs_are_compared_by_participant(navirl, work):
         rf"^path length m +{found['mean_difference']:+.3f} +- +3 +{found['p_value']:.3g} ", text, re.MULTILINE
     )
     refused = navirl("evaluate", work / "demos.json", "--pair", "joystick", "force", code=1).stderr
-    assert "--pair: no group is called 'force'; there are 'force, cycle 1', 'force, cycle 2'" in refused
+    assert "expected the names of two groups, found 'force'; there are 'force, cycle 1', 'force, cycle 2'" in refused
 
 
 def test_groups_by_participant(navirl, work):

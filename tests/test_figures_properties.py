@@ -7,7 +7,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, LEARNT, ON_GRID, GroupMetrics
+from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, LEARNT, ON_GRID
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures.properties import PropertyBar, bars_of, draw_properties, height_for
 from navirl_cli.figures.sheet import new_figure

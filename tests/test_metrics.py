@@ -9,15 +9,18 @@ import pytest
 
 from navirl_cli.evaluation.metrics import (
     BY_NAME,
+    LEAVES_M,
     METRICS,
     PAPER_METRICS,
     area_between_m2,
     center_distance_m,
     line_values,
+    onset_m,
     paper_values,
     path_length_m,
 )
 
+NOMINAL, PERSON = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[6.0, 0.3]])
 STRAIGHT = np.array([[0.0, 0.0], [4.0, 0.0]])
 NOBODY = np.zeros((0, 2))
 
@@ -173,3 +176,34 @@ def test_without_people_there_are_no_zones():
     found = line_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
     for name in ("mean_distance_m", "compliance", "intimate_m", "public_share"):
         assert np.isnan(found[name]), name
+
+
+def test_the_onset_is_where_the_path_is_15_cm_off():
+    # A line that rises by 0.1 m a metre from x = 2 m on is 15 cm off at 3.5 m.
+    line = np.array([[0.0, 0.0], [2.0, 0.0], [7.0, 0.5], [10.0, 0.0]])
+    assert onset_m(line, NOMINAL, PERSON) == pytest.approx(6.0 - 3.5)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.1, 2.5])
+def test_the_onset_knows_no_direction(turn):
+    line = np.array([[0.0, 0.0], [2.0, 0.0], [7.0, -0.5], [10.0, 0.0]])
+    cos, sin = np.cos(turn), np.sin(turn)
+    turned = [part @ np.array([[cos, sin], [-sin, cos]]) + (3.0, -7.0) for part in (line, NOMINAL, PERSON)]
+    assert onset_m(*turned) == pytest.approx(2.5)
+
+
+def test_the_first_person_counts_and_the_onset_may_lie_behind():
+    line = np.array([[0.0, 0.0], [2.0, 0.0], [7.0, 0.5], [10.0, 0.0]])
+    assert onset_m(line, NOMINAL, np.array([[9.0, 1.0], [1.5, 0.0]])) == pytest.approx(1.5 - 3.5)
+
+
+@pytest.mark.parametrize(
+    ("line", "people"),
+    [
+        ([[0.0, 0.0], [5.0, LEAVES_M], [10.0, 0.0]], PERSON),  # never leaves
+        ([[0.0, 0.4], [5.0, 0.4], [10.0, 0.0]], PERSON),  # starts away
+        ([[0.0, 0.0], [5.0, 1.0], [10.0, 0.0]], np.zeros((0, 2))),  # nobody is there
+    ],
+)
+def test_some_paths_have_no_onset(line, people):
+    assert np.isnan(onset_m(np.array(line), NOMINAL, people))

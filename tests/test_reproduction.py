@@ -61,7 +61,7 @@ def summary(written):
 
 def of(extraction, name):
     """The demonstrations of one of the published lists."""
-    from navirl_cli.evaluation.compare import group_of
+    from navirl_cli.evaluation.groups import group_of
 
     return [one for one in extraction.demonstrations if group_of(one) == GROUPS[name]]
 

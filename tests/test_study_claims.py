@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID
+from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.study.claims import Claim, Difference, Verdict, claims_of, paired, scatter_within
-from navirl_cli.study.measures import Measured
+from navirl_cli.evaluation.paired import Paired, paired
+from navirl_cli.study.claims import Claim, Difference, Verdict, claims_of, scatter_within
 
 FORCE, JOYSTICK, REPLAY, AVOIDANCE = "force, cycle 2", "joystick", "replay of the learnt policy", "obstacle avoidance"
 
@@ -18,12 +20,16 @@ def values(*three):
 
 
 def row(participant, group, length=6.8, distance=0.7, area=2.4, onset=2.0, on_grid=None):
-    driven = values(length, distance - 0.4, area)
-    return Measured("", participant, group, driven, on_grid or driven, distance, onset)
+    found = values(length, distance - 0.4, area)
+    driven = {**found, "min_center_distance_m": distance, "onset_m": onset}
+    return Measured("", participant, group, {DRIVEN: driven, ON_GRID: on_grid or found})
 
 
 def difference(lower, upper, margin=None):
-    return Difference("", "m", (lower + upper) / 2, lower, upper, {"a": 0.1, "b": -0.2, "c": 0.0}, margin)
+    """Two participants whose Student's interval reaches from one number to another."""
+    half = (upper - lower) / 2 / stats.t.ppf(0.975, 1)
+    middle = (lower + upper) / 2
+    return Difference("", "m", Paired({"a": middle - half, "b": middle + half}), margin)
 
 
 def titled(claims, title):
@@ -32,20 +38,14 @@ def titled(claims, title):
 
 
 def test_differences_are_paired_with_students_interval():
-    one, other = {"a": 1.0, "b": 2.5, "c": 4.0, "x": 9.0}, {"c": 3.0, "a": 0.5, "b": 2.75, "y": 1.0}
-    found = paired("length", "m", one, other)
-    values = np.array([0.5, -0.25, 1.0])
-    low, high = stats.t.interval(0.95, 2, values.mean(), stats.sem(values))
-    assert (found.mean, found.lower, found.upper) == pytest.approx((values.mean(), low, high))
-    assert found.values == pytest.approx({"a": 0.5, "b": -0.25, "c": 1.0})
-    assert found.against == ["b"]
-    assert paired("length", "m", {"a": 1.0}, {"b": 1.0}) is None
+    (found,) = titled(claims_of(study(3), []), "joystick").differences
+    values = np.array(list(found.paired.differences.values()))
+    assert found.paired.student == pytest.approx(stats.t.interval(0.95, 2, values.mean(), stats.sem(values)))
+    assert found.paired.bootstrap is None
 
 
 def test_one_participant_settles_nothing():
-    found = paired("length", "m", {"a": 2.0}, {"a": 1.0})
-    assert (found.mean, found.verdict) == (1.0, Verdict.OPEN)
-    assert np.isnan([found.lower, found.upper]).all()
+    assert Difference("length", "m", paired({"a": 2.0}, {"a": 1.0})).verdict is Verdict.OPEN
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,9 @@ def test_a_verdict_is_where_the_interval_lies(lower, upper, margin, verdict):
 
 
 def test_who_speaks_against_a_claim_is_named():
-    assert difference(0.1, 0.2).against == ["b", "c"]
-    assert difference(0.1, 0.2, margin=0.15).against == ["b"]
+    found = Paired({"a": 0.1, "b": -0.2, "c": 0.0})
+    assert Difference("", "m", found).against == ["b", "c"]
+    assert Difference("", "m", found, margin=0.15).against == ["b"]
 
 
 def test_a_claim_is_as_good_as_its_worst_difference():
@@ -112,8 +113,8 @@ def test_claims_hold_where_the_numbers_say_so():
     assert set(verdicts.values()) == {Verdict.HOLDS}
     assert [one.margin is None for one in titled(claims, "replays").differences] == [False] * 3
     (joystick,) = titled(claims, "joystick").differences
-    assert joystick.mean == pytest.approx(0.2, abs=0.02)
-    assert (len(joystick.values), joystick.against) == (13, [])
+    assert joystick.paired.mean == pytest.approx(0.2, abs=0.02)
+    assert (joystick.paired.n, joystick.against) == (13, [])
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,10 @@ def test_replays_that_are_far_are_not_close():
 
 
 def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
-    rows = [row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.onset_m) for one in study()]
+    rows = [
+        row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.values[DRIVEN]["onset_m"])
+        for one in study()
+    ]
     claim = titled(claims_of(rows, []), "late avoidance")
     assert "less autonomous" in claim.asked
     assert claim.text.startswith("The robot by itself (autonomous) begins")
@@ -142,7 +146,7 @@ def test_claims_without_data_are_left_out():
 
 
 def near(expected):
-    return SimpleNamespace(near=SimpleNamespace(expected=values(*expected)))
+    return SimpleNamespace(near=SimpleNamespace(learnt=GroupMetrics("", LEARNT, 2, values(*expected), {})))
 
 
 def test_expected_paths_are_held_against_those_on_the_grid():
@@ -154,18 +158,18 @@ def test_expected_paths_are_held_against_those_on_the_grid():
     # Length is a feature of the reward, and no evidence of its own.
     assert [one.what for one in claims[0].differences] == ["min. distance", "area under path"]
     distance = claims[0].differences[0]
-    assert distance.mean == pytest.approx(0.02)
+    assert distance.paired.mean == pytest.approx(0.02)
     # Each participant has two paths 0.2 m apart: 0.1 m about their mean, with one degree of freedom each.
     assert distance.margin == pytest.approx(0.1 * np.sqrt(2))
 
 
 def test_the_margin_is_the_scatter_within_participants_whatever_lies_between_them():
     rows = [row(f"p{k}", FORCE, length=6.0 + k + s) for k in range(4) for s in (-0.05, 0.05)]
-    assert scatter_within(rows, lambda one: one.driven["length_m"]) == pytest.approx(0.05 * np.sqrt(2))
-    assert np.isnan(scatter_within(rows[::2], lambda one: one.driven["length_m"]))
+    assert scatter_within(rows, DRIVEN, "length_m") == pytest.approx(0.05 * np.sqrt(2))
+    assert np.isnan(scatter_within(rows[::2], DRIVEN, "length_m"))
 
 
 def test_who_saw_nobody_takes_no_part():
     rows = [*study(), row("alone", FORCE, distance=float("nan"), area=99.0), row("alone", AVOIDANCE, area=0.0)]
     area = titled(claims_of(rows, []), "smallest area").differences[0]
-    assert "alone" not in area.values
+    assert "alone" not in area.paired.differences

@@ -106,8 +106,8 @@ def test_scenes_without_people_do_not_spoil_the_distance():
     alone = [replace(one, people_m=np.zeros((0, 2))) for one in SECONDS["bob"]]
     near = closeness(TRUTH, [*SECONDS["ann"], *alone], 100, np.random.default_rng(0))
     only = closeness(TRUTH, SECONDS["ann"], 100, np.random.default_rng(0))
-    assert near.expected["min_distance_m"] == pytest.approx(only.expected["min_distance_m"])
-    assert np.isfinite(near.expected["length_m"])
+    assert near.learnt.expected("min_distance_m") == pytest.approx(only.learnt.expected("min_distance_m"))
+    assert np.isfinite(near.learnt.expected("length_m"))
 
 
 def test_what_a_reader_should_know():
@@ -131,13 +131,15 @@ def test_expected_properties_are_those_of_many_paths():
     result = compare(SECONDS["ann"], {"t": TRUTH}, Precision(4000), np.random.default_rng(1))
     rows = {row.kind: row for row in result.groups}
     for name in ("length_m", "min_distance_m", "area_m2"):
-        assert near.demonstrated[name] == rows[ON_GRID].mean[name]
-        assert near.demonstrated_spread[name] == rows[ON_GRID].std[name]
-        error = np.hypot(rows[LEARNT].error[name], near.error[name])
-        assert abs(near.expected[name] - rows[LEARNT].mean[name]) < 4 * error, name
-        assert near.spread[name] == pytest.approx(rows[LEARNT].std[name], rel=0.06), name
-    assert near.error["length_m"] == 0.0
-    assert near.error["area_m2"] == pytest.approx(near.spread["area_m2"] / np.sqrt(4000), rel=1e-3)
+        assert near.demonstrated.mean[name] == rows[ON_GRID].mean[name]
+        assert near.demonstrated.std[name] == rows[ON_GRID].std[name]
+        error = np.hypot(rows[LEARNT].error[name], near.learnt.monte_carlo_error(name))
+        assert abs(near.learnt.expected(name) - rows[LEARNT].mean[name]) < 4 * error, name
+        assert near.learnt.std[name] == pytest.approx(rows[LEARNT].std[name], rel=0.06), name
+    assert near.learnt.monte_carlo_error("length_m") == 0.0
+    assert near.learnt.monte_carlo_error("area_m2") == pytest.approx(
+        near.learnt.std["area_m2"] / np.sqrt(4000), rel=1e-3
+    )
 
 
 def test_scenes_count_by_their_demonstrations_and_their_difference_is_spread():
@@ -145,12 +147,12 @@ def test_scenes_count_by_their_demonstrations_and_their_difference_is_spread():
     mixed = [*SECONDS["ann"], replace(FIRSTS["ann"][0], cycle=2)]
     near = closeness(TRUTH, mixed, 4000, np.random.default_rng(0))
     one, other = (closeness(TRUTH, part, 4000, np.random.default_rng(0)) for part in (mixed[:2], mixed[2:]))
-    lengths = np.array([one.expected["length_m"], other.expected["length_m"]])
+    lengths = np.array([one.learnt.expected("length_m"), other.learnt.expected("length_m")])
     share = np.array([2 / 3, 1 / 3])
-    assert near.expected["length_m"] == pytest.approx(share @ lengths)
-    within = share @ np.array([one.spread["length_m"], other.spread["length_m"]]) ** 2
+    assert near.learnt.expected("length_m") == pytest.approx(share @ lengths)
+    within = share @ np.array([one.learnt.std["length_m"], other.learnt.std["length_m"]]) ** 2
     between = share @ (lengths - share @ lengths) ** 2
-    assert near.spread["length_m"] == pytest.approx(np.sqrt(within + between), rel=0.05)
+    assert near.learnt.std["length_m"] == pytest.approx(np.sqrt(within + between), rel=0.05)
 
 
 def test_numbers_do_not_depend_on_where_they_are_computed():

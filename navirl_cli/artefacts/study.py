@@ -4,12 +4,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from navirl_cli.artefacts.store import number
-from navirl_cli.evaluation.compare import GroupMetrics
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Values
 from navirl_cli.irl.fit import Fit
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt
-from navirl_cli.study.measures import GroupProperties
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
 from navirl_cli.study.questionnaire import Shares
 
@@ -25,7 +25,7 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
     return {
         "participants": {one.participant: _learnt(one) for one in study.participants},
         "pooled": _learnt(study.pooled),
-        "metrics": {one.group: _properties(one) for one in study.groups},
+        "metrics": _properties(study.groups),
         "claims": [_claim(one) for one in study.claims],
         "completion_s": {
             modality: {participant: list(times) for participant, times in known.items()}
@@ -46,9 +46,10 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
             {
                 "id": row.id,
                 "group": row.group,
-                "metrics": _metrics(row.driven) | {"min_center_distance_m": number(row.center_distance_m)},
-                "metrics_on_grid": _metrics(row.on_grid),
-                "onset_m": number(row.onset_m),
+                "metrics": _metrics(row.values[DRIVEN])
+                | {"min_center_distance_m": number(row.values[DRIVEN]["min_center_distance_m"])},
+                "metrics_on_grid": _metrics(row.values[ON_GRID]),
+                "onset_m": number(row.values[DRIVEN]["onset_m"]),
             }
             for row in study.rows
         ],
@@ -104,34 +105,26 @@ def _by_name(names: Iterable[str], values: Iterable[float]) -> dict[str, float |
 
 def _closeness(near: Closeness) -> dict[str, Any]:
     """Properties expected under the policy beside the demonstrated ones, on the grid."""
+    shown, learnt = near.demonstrated, near.learnt
+    names = [metric.name for metric in PAPER_METRICS]
     return {
-        "demonstrated": _metrics(near.demonstrated),
-        "demonstrated_standard_deviation": _metrics(near.demonstrated_spread),
-        "expected": _metrics(near.expected),
-        "standard_deviation": _metrics(near.spread),
-        "monte_carlo_error": _metrics(near.error),
+        "demonstrated": _metrics(shown.mean),
+        "demonstrated_standard_deviation": _metrics(shown.std),
+        "expected": {name: number(learnt.expected(name)) for name in names},
+        "standard_deviation": _metrics(learnt.std),
+        "monte_carlo_error": {name: number(learnt.monte_carlo_error(name)) for name in names},
     }
 
 
-def _properties(group: GroupProperties) -> dict[str, Any]:
-    """Mean and standard deviation of each property over the group's paths."""
-    means = _mean_and_spread(group.driven)
-    for name, (mean, spread) in (
-        ("min_center_distance_m", group.center_distance_m),
-        ("onset_m", group.onset_m),
-    ):
-        means[name] = {"mean": number(mean), "standard_deviation": number(spread)}
-    return {
-        "paths": group.driven.count,
-        "participants": group.participants,
-        "driven": means,
-        "on_grid": _mean_and_spread(group.on_grid),
-    }
-
-
-def _mean_and_spread(metrics: GroupMetrics) -> dict[str, dict[str, float | None]]:
-    mean, spread = _metrics(metrics.mean), _metrics(metrics.std)
-    return {name: {"mean": mean[name], "standard_deviation": spread[name]} for name in mean}
+def _properties(rows: Iterable[GroupMetrics]) -> dict[str, Any]:
+    """Mean and standard deviation of each property over the paths of each group."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        group = found.setdefault(row.group, {"paths": row.count, "participants": row.participants})
+        group["driven" if row.kind == DRIVEN else "on_grid"] = {
+            name: {"mean": number(mean), "standard_deviation": number(row.std[name])} for name, mean in row.mean.items()
+        }
+    return found
 
 
 def _claim(claim: Claim) -> dict[str, Any]:
@@ -143,10 +136,10 @@ def _claim(claim: Claim) -> dict[str, Any]:
             {
                 "of": one.what,
                 "unit": one.unit,
-                "mean": one.mean,
-                "lower": number(one.lower),
-                "upper": number(one.upper),
-                "by_participant": dict(one.values),
+                "mean": one.paired.mean,
+                "lower": number(one.paired.student.lower),
+                "upper": number(one.paired.student.upper),
+                "by_participant": dict(one.paired.differences),
                 "margin": None if one.margin is None else number(one.margin),
                 "against": one.against,
                 "verdict": one.verdict.value,

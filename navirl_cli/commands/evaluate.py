@@ -25,10 +25,11 @@ from navirl_cli.commands.shared import (
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import ENDINGS, Format, formatted
 from navirl_cli.errors import ArtefactError, DemonstrationError
-from navirl_cli.evaluation.compare import FIELDS, compare
+from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.groups import FIELDS
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.pairs import pairs_of
+from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import check_writable, replacing
 from navirl_cli.irl.reward import Reward
@@ -161,7 +162,7 @@ def evaluate(
             fields=fields,
             progress=lambda done, _all: update(done, ""),
         )
-    compared = [(one, other, pairs_of(result.driven, one, other, metrics, rng)) for one, other in pairs]
+    compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
     ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
     inputs = [Input.of(path) for path in (demos, *rewards)]
     content = document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)

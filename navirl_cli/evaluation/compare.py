@@ -1,17 +1,18 @@
 """Demonstrated paths against learnt ones and against paths that know nothing of people's wishes."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.arrays import FloatArray
+from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, draw
-from navirl_cli.evaluation.metrics import METRICS, Values, line_values
+from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
+from navirl_cli.evaluation.metrics import METRICS, line_values
 from navirl_cli.evaluation.motion import contact_values, motion_values
-from navirl_cli.evaluation.nearness import nearness
+from navirl_cli.evaluation.policy_paths import nearness
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
 
@@ -27,43 +28,6 @@ KINDS: dict[str, str] = {
     NOMINAL: "the line that the log says the navigation followed, else the shortest way on the map without people",
     AVOIDANCE: "the shortest way on the grid around people as obstacles of radius 0.25 m",
 }
-#: By what demonstrations can be grouped.
-FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
-    "condition": lambda one: one.condition.value,
-    "cycle": lambda one: "no cycle" if one.cycle is None else f"cycle {one.cycle}",
-    "set": lambda one: one.set or "main task",
-    "participant": lambda one: one.participant,
-}
-
-
-@dataclass(frozen=True, eq=False)
-class GroupMetrics(ByContent):
-    """Mean and spread of the paths of one kind in one group of demonstrations."""
-
-    group: str
-    kind: str
-    #: Number of demonstrations.
-    count: int
-    mean: Values
-    #: Sample standard deviation (n - 1) over demonstrations, or of one path under the policy; NaN for one path.
-    std: Values
-    #: Of learnt paths: Monte Carlo standard error of the mean.
-    error: Values = field(default_factory=dict)
-    #: Of learnt paths: exact expected values, where visits give them.
-    exact: Values = field(default_factory=dict)
-    #: Of other paths: half the 95 % interval of the mean, participants counting with their own means (Student); NaN
-    #: for one participant.
-    half_interval: Values = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class Driven(ByContent):
-    """What was measured of one demonstration as driven."""
-
-    id: str
-    participant: str
-    group: str
-    values: Values
 
 
 @dataclass(frozen=True)
@@ -71,31 +35,9 @@ class Comparison:
     """All metrics of a set of demonstrations."""
 
     groups: tuple[GroupMetrics, ...]
-    driven: tuple[Driven, ...]
+    rows: tuple[Measured, ...]
     #: What could not be measured, and why.
     notes: tuple[str, ...]
-
-
-def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
-    """Demonstrations by group: force first, by cycle, then joystick, then autonomous; special sets after the rest."""
-    order = list(Condition)
-    groups: dict[str, list[Demonstration]] = {}
-    for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.set or "", one.cycle or 0)):
-        groups.setdefault(group_of(one, fields), []).append(one)
-    return groups
-
-
-def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
-    """The group of a demonstration: its condition, its cycle and its set where known, or what fields of FIELDS say.
-
-    A robot that drives by itself is what its set says: "obstacle avoidance".
-    """
-    if fields:
-        return ", ".join(of(demonstration) for name, of in FIELDS.items() if name in fields)
-    alone = demonstration.condition is Condition.AUTONOMOUS and demonstration.set is not None
-    condition = [] if alone else [demonstration.condition.value]
-    cycle = [] if demonstration.cycle is None else [f"cycle {demonstration.cycle}"]
-    return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
 
 
 def compare(
@@ -124,21 +66,19 @@ def compare(
         SceneError: A demonstration's scene has no way.
         InfinitePartitionError: A reward has no policy in a scene.
     """
-    lines: dict[tuple[str, str], list[tuple[str, Values]]] = {}
     learnt: dict[tuple[str, str], list[tuple[Drawn, dict[str, FloatArray]]]] = {}
     known: dict[tuple[str, int, float], Drawn] = {}
-    rows: list[Driven] = []
+    rows: list[Measured] = []
     notes: list[str] = []
     for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
         group = group_of(one, fields)
         paths = _lines(one, scene, notes)
         nominal = paths[NOMINAL]
-        for kind, line in paths.items():
-            values = line_values(line, nominal, one.people_m, one.robot_radius_m)
-            if kind == DRIVEN:
-                values = {**values, **motion_values(one), **contact_values(one)}
-                rows.append(Driven(one.id, one.participant, group, values))
-            lines.setdefault((group, kind), []).append((one.participant, values))
+        found = {
+            kind: dict(line_values(line, nominal, one.people_m, one.robot_radius_m)) for kind, line in paths.items()
+        }
+        found[DRIVEN] |= {**motion_values(one), **contact_values(one)}
+        rows.append(Measured(one.id, one.participant, group, found))
         for name, reward in rewards.items():
             key = (name, id(scene), one.robot_radius_m)
             if key not in known:
@@ -148,7 +88,11 @@ def compare(
             learnt.setdefault((group, kind), []).append((known[key], near))
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    groups = [_with_interval(summary_of(*key, [values for _, values in own]), own) for key, own in lines.items()]
+    groups = [
+        summary_of(group, kind, [row for row in rows if row.group == group])
+        for group in dict.fromkeys(row.group for row in rows)
+        for kind in dict.fromkeys(kind for row in rows if row.group == group for kind in row.values)
+    ]
     groups += [_learnt(group, kind, members) for (group, kind), members in learnt.items()]
     order = list(by_group(demonstrations, fields))
     groups.sort(key=lambda row: (order.index(row.group), _place(row.kind), row.kind))
@@ -178,36 +122,6 @@ def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict
     except SceneError as error:
         notes.append(f"{demonstration.id}: no path around the people as obstacles: {error}")
     return lines
-
-
-def summary_of(group: str, kind: str, measured: Iterable[Values]) -> GroupMetrics:
-    """Mean and standard deviation over the paths that have a value (distance to people needs people)."""
-    mean, spread = {}, {}
-    paths = list(measured)
-    for metric in METRICS:
-        values = np.array([one[metric.name] for one in paths if metric.name in one])
-        values = values[np.isfinite(values)]
-        if any(metric.name in one for one in paths):
-            mean[metric.name] = float(values.mean()) if len(values) else float("nan")
-            spread[metric.name] = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
-    return GroupMetrics(group, kind, len(paths), mean, spread)
-
-
-def _with_interval(row: GroupMetrics, measured: Sequence[tuple[str, Values]]) -> GroupMetrics:
-    """A group with intervals of its means over participants; values come with whose they are."""
-    from scipy.stats import t
-
-    found = {}
-    for name in row.mean:
-        own: dict[str, list[float]] = {}
-        for participant, values in measured:
-            if np.isfinite(values[name]):
-                own.setdefault(participant, []).append(values[name])
-        means = np.array([np.mean(known) for known in own.values()])
-        several = len(means) > 1
-        half = t.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)) if several else np.nan
-        found[name] = float(half)
-    return replace(row, half_interval=found)
 
 
 def _learnt(group: str, kind: str, members: Sequence[tuple[Drawn, dict[str, FloatArray]]]) -> GroupMetrics:

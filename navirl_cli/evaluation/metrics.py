@@ -15,6 +15,8 @@ Values = Mapping[str, float]
 #: Driven lines are looked at in pieces no longer than this, m, and turns between points this far apart (a little less,
 #: so that points of the grid stay).
 PIECE_M, APART_M = 0.1, 0.0999
+#: A path has left the nominal one where it is farther from it than this, m: a cell and a half.
+LEAVES_M = 0.15
 
 
 class Of(StrEnum):
@@ -224,3 +226,28 @@ def areas_m2(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
     faces = shapely.polygonize(shapely.node(shapely.linestrings(rings))[:, None])
     area: FloatArray = shapely.area(faces)
     return area
+
+
+def onset_m(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray) -> float:
+    """How far before the first person a path leaves the nominal one, along it.
+
+    Args:
+        line_m: (n, 2) m, the path.
+        nominal_m: (k, 2) m.
+        people_m: (p, 2) m.
+
+    Returns:
+        m; negative where it leaves behind the first person; NaN where there is nobody, or the path never leaves the
+        nominal one by LEAVES_M, or starts away from it.
+    """
+    from shapely import LineString, distance, line_locate_point, points
+
+    nominal = LineString(nominal_m)
+    away = distance(points(line_m), nominal)
+    if len(people_m) == 0 or away[0] > LEAVES_M or away.max() <= LEAVES_M:
+        return float("nan")
+    left = int(np.argmax(away > LEAVES_M))
+    share = (LEAVES_M - away[left - 1]) / (away[left] - away[left - 1])
+    where = line_m[left - 1] + share * (line_m[left] - line_m[left - 1])
+    person = float(line_locate_point(nominal, points(people_m)).min())
+    return person - float(line_locate_point(nominal, points(where)))

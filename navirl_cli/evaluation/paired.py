@@ -1,87 +1,155 @@
-"""Two groups of paths compared within participants: difference, interval, test and effect size."""
+"""Two groups of paths compared within participants: difference, intervals, test and effect sizes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.compare import DRIVEN
+from navirl_cli.evaluation.groups import LEVEL, Measured, by_participant, mean_and_spread, student_half_width
+from navirl_cli.evaluation.metrics import Metric
 
-LEVEL = 0.95
 RESAMPLES = 9999
-#: Fewer pairs have no interval of resampled means: all that they can say are a handful of values.
+#: Fewer pairs have no bootstrap interval: their resampled means take only a handful of values.
 FEWEST = 4
 
 
-@dataclass(frozen=True)
-class Paired:
-    """One group's values less another's, over the participants who have both."""
+class Interval(NamedTuple):
+    """A 95 % interval; NaN where it does not exist."""
+
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class Paired(ByContent):
+    """One group's values minus another's, over the participants who have both.
+
+    scipy.stats takes half a second to import, as long as the work of most commands. Bootstrap and Wilcoxon's test
+    import it when they are asked for; Student's interval does not need it.
+    """
 
     #: By participant.
     differences: Mapping[str, float]
-    mean: float
-    #: 95 % bootstrap interval of the mean (bias-corrected and accelerated); NaN below FEWEST pairs.
-    lower: float
-    upper: float
-    #: Two-sided p-value of Wilcoxon's signed-rank test, exact for few pairs without ties; NaN where none differs.
-    p_value: float
-    #: Cohen's d_z: mean over standard deviation of the differences; NaN for one pair or none that differs.
-    cohen_dz: float
-    #: Matched-pairs rank-biserial correlation in [-1, 1]: favourable less unfavourable share of the ranks.
-    rank_biserial: float
+    #: Bootstrap interval of the mean (bias-corrected and accelerated); NaN below FEWEST pairs, None where it was not
+    #: asked for.
+    bootstrap: Interval | None = None
 
     @property
     def n(self) -> int:
         """Number of pairs."""
         return len(self.differences)
 
+    @property
+    def mean(self) -> float:
+        """Mean difference; NaN for no pair."""
+        return mean_and_spread(self.differences.values())[0]
 
-def paired(one: Mapping[str, float], other: Mapping[str, float], rng: np.random.Generator) -> Paired:
+    @property
+    def student(self) -> Interval:
+        """Student's interval of the mean; NaN for fewer than two pairs."""
+        half = student_half_width(self.differences.values())
+        return Interval(self.mean - half, self.mean + half)
+
+    @property
+    def cohen_dz(self) -> float:
+        """Cohen's d_z: mean over standard deviation of the differences; NaN for one pair and for equal differences."""
+        mean, std = mean_and_spread(self.differences.values())
+        return mean / std if std > 0 else float("nan")
+
+    @cached_property
+    def wilcoxon_p(self) -> float:
+        """Two-sided p-value of Wilcoxon's signed-rank test without the pairs that do not differ; NaN for none.
+
+        Exact for up to 50 pairs without ties.
+        """
+        from scipy.stats import wilcoxon
+
+        return float(wilcoxon(self._differing).pvalue) if len(self._differing) else float("nan")
+
+    @cached_property
+    def rank_biserial(self) -> float:
+        """Matched-pairs rank-biserial correlation in [-1, 1]: share of the ranks of positive minus negative pairs."""
+        from scipy.stats import rankdata
+
+        if len(self._differing) == 0:
+            return float("nan")
+        ranks = rankdata(np.abs(self._differing))
+        return float((ranks * np.sign(self._differing)).sum() / ranks.sum())
+
+    @property
+    def _differing(self) -> FloatArray:
+        """The differences that are not zero."""
+        values: FloatArray = np.array([value for value in self.differences.values() if value != 0])
+        return values
+
+
+def paired(one: Mapping[str, float], other: Mapping[str, float], rng: np.random.Generator | None = None) -> Paired:
     """Compare two groups by participant.
 
     Args:
         one: A value by participant.
         other: The same in the other group.
-        rng: Source of randomness of the bootstrap.
+        rng: Source of randomness of the bootstrap; without it there is none.
 
     Returns:
-        one less other; participants without a finite value in both do not count.
+        one minus other; participants without a finite value in both do not count.
     """
     both = {
         name: float(one[name] - other[name])
         for name in one
         if name in other and np.isfinite(one[name]) and np.isfinite(other[name])
     }
-    values = np.array(list(both.values()))
-    mean = float(values.mean()) if len(values) else float("nan")
-    spread = float(values.std(ddof=1)) if len(values) > 1 else float("nan")
-    lower, upper = _interval(values, rng)
-    p_value, biserial = _signed_ranks(values)
-    dz = mean / spread if spread > 0 else float("nan")
-    return Paired(both, mean, lower, upper, p_value, dz, biserial)
+    return Paired(both, None if rng is None else _bootstrap(np.array(list(both.values())), rng))
 
 
-def _interval(values: FloatArray, rng: np.random.Generator) -> tuple[float, float]:
-    """Bootstrap interval of a mean."""
+def pairs_of(
+    rows: Iterable[Measured], one: str, other: str, metrics: Sequence[Metric], rng: np.random.Generator
+) -> dict[str, Paired]:
+    """Compare the driven paths of two groups, each participant counting with the mean over their own in a group.
+
+    Args:
+        rows: What was measured.
+        one: Name of a group.
+        other: Name of another.
+        metrics: To compare.
+        rng: Source of randomness.
+
+    Returns:
+        By metric: one minus other. Metrics of which no participant has values in both groups are not in it.
+
+    Raises:
+        DemonstrationError: A group does not exist.
+    """
+    groups: dict[str, list[Measured]] = {}
+    for row in rows:
+        groups.setdefault(row.group, []).append(row)
+    for name in (one, other):
+        if name not in groups:
+            known = ", ".join(map(repr, groups))
+            raise DemonstrationError(f"`pair`: expected the names of two groups, found {name!r}; there are {known}")
+    found = {
+        metric.name: paired(
+            by_participant(groups[one], DRIVEN, metric.name), by_participant(groups[other], DRIVEN, metric.name), rng
+        )
+        for metric in metrics
+    }
+    return {name: result for name, result in found.items() if result.n}
+
+
+def _bootstrap(values: FloatArray, rng: np.random.Generator) -> Interval:
+    """Bootstrap interval of a mean (B. Efron, JASA 82 (1987): bias-corrected and accelerated)."""
     if len(values) < FEWEST:
-        return float("nan"), float("nan")
+        return Interval(float("nan"), float("nan"))
     if np.ptp(values) == 0:
-        return float(values[0]), float(values[0])
+        return Interval(float(values[0]), float(values[0]))
     from scipy.stats import bootstrap
 
     found = bootstrap(
         (values,), np.mean, n_resamples=RESAMPLES, confidence_level=LEVEL, method="BCa", rng=rng, vectorized=True
     ).confidence_interval
-    return float(found.low), float(found.high)
-
-
-def _signed_ranks(values: FloatArray) -> tuple[float, float]:
-    """p-value and rank-biserial correlation; pairs that do not differ are left out (Wilcoxon's way)."""
-    from scipy.stats import rankdata, wilcoxon
-
-    differing = values[values != 0]
-    if len(differing) == 0:
-        return float("nan"), float("nan")
-    ranks = rankdata(np.abs(differing))
-    biserial = float((ranks * np.sign(differing)).sum() / ranks.sum())
-    return float(wilcoxon(differing).pvalue), biserial
+    return Interval(float(found.low), float(found.high))

@@ -14,7 +14,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import moves_along
-from navirl_cli.evaluation.compare import group_of
+from navirl_cli.evaluation.groups import group_of
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import SampledPaths, sample_paths
 from navirl_cli.irl.reward import Reward

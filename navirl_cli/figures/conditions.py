@@ -11,7 +11,7 @@ from matplotlib.legend import Legend
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.compare import by_group
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.figures.ground import Window
 from navirl_cli.figures.marks import merged_handles
 from navirl_cli.figures.paths import DrawnPaths, contact_handle, draw_paths, group_handles, window_of

@@ -15,7 +15,7 @@ from matplotlib.text import Annotation
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.compare import group_of
+from navirl_cli.evaluation.groups import group_of
 from navirl_cli.figures.ground import Window, cropped_to, window_around
 from navirl_cli.figures.paths import DrawnPaths, draw_paths
 from navirl_cli.figures.scale import free_corner, write_beside

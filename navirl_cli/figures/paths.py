@@ -15,7 +15,7 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.compare import by_group
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, legend_below, window_around
 from navirl_cli.figures.marks import Marks, Places, draw_marks
 from navirl_cli.figures.style import colour_of, house_style

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.compare import by_group
+from navirl_cli.evaluation.compare import DRIVEN
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
 from navirl_cli.figures.conditions import draw_path_panels
@@ -136,7 +137,7 @@ def _answers(bars: Sequence[Shares]) -> _Drawn:
 
 
 def _properties(study: Study) -> _Drawn:
-    bars = properties.bars_of(one.driven for one in study.groups)
+    bars = properties.bars_of(row for row in study.groups if row.kind == DRIVEN)
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     return figure, False

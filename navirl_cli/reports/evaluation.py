@@ -8,8 +8,9 @@ import numpy as np
 
 from navirl_cli.artefacts.store import Input, number
 from navirl_cli.documents.tables import Format, Table, formatted
-from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison, GroupMetrics
+from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison
 from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
@@ -124,8 +125,11 @@ def _paired(found: Mapping[str, Paired], metrics: Sequence[Metric]) -> tuple[lis
         if metric.name not in found:
             continue
         one = found[metric.name]
-        interval = f"{one.lower:+.3f} to {one.upper:+.3f}" if isfinite(one.lower) else "-"
-        sizes = [f"{value:.3g}" if isfinite(value) else "-" for value in (one.p_value, one.cohen_dz, one.rank_biserial)]
+        lower, upper = one.bootstrap or (np.nan, np.nan)
+        interval = f"{lower:+.3f} to {upper:+.3f}" if isfinite(lower) else "-"
+        sizes = [
+            f"{value:.3g}" if isfinite(value) else "-" for value in (one.wilcoxon_p, one.cohen_dz, one.rank_biserial)
+        ]
         rows.append([metric.heading, f"{one.mean:+.3f}", interval, str(one.n), *sizes])
     return header, rows
 
@@ -196,8 +200,8 @@ def document(
             for row in result.groups
         ],
         "demonstrations": [
-            {"id": row.id, "group": row.group, "paths": DRIVEN, "metrics": _chosen(row.values, names)}
-            for row in result.driven
+            {"id": row.id, "group": row.group, "paths": DRIVEN, "metrics": _chosen(row.values[DRIVEN], names)}
+            for row in result.rows
         ],
         "pairs": [
             {"group": one, "less": other, "metrics": {name: _pair(value) for name, value in found.items()}}
@@ -213,12 +217,13 @@ def _chosen(values: Values, names: Sequence[str]) -> dict[str, float | None]:
 
 
 def _pair(one: Paired) -> dict[str, Any]:
+    lower, upper = one.bootstrap or (np.nan, np.nan)
     return {
         "mean_difference": one.mean,
-        "lower": number(one.lower),
-        "upper": number(one.upper),
+        "lower": number(lower),
+        "upper": number(upper),
         "n": one.n,
-        "p_value": number(one.p_value),
+        "p_value": number(one.wilcoxon_p),
         "cohen_dz": number(one.cohen_dz),
         "rank_biserial": number(one.rank_biserial),
         "by_participant": dict(one.differences),

@@ -9,7 +9,7 @@ import numpy as np
 from navirl_cli import __version__
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
-from navirl_cli.evaluation.metrics import PAPER_METRICS
+from navirl_cli.evaluation.metrics import LEAVES_M, PAPER_METRICS
 from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
@@ -24,7 +24,6 @@ from navirl_cli.reports.study_tables import (
 )
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import FIRST, SECOND, CycleFit
-from navirl_cli.study.measures import LEAVES_M
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, Study
 from navirl_cli.study.questionnaire import Answer, Shares
 
@@ -132,7 +131,7 @@ def claims_lines(claims: Sequence[Claim], mark: str = "") -> list[str]:
     """
     lines = []
     for claim in claims:
-        said = "; ".join(f"{one.what} {signed(one.mean, one.unit)}" for one in claim.differences)
+        said = "; ".join(f"{one.what} {signed(one.paired.mean, one.unit)}" for one in claim.differences)
         lines.append(f"{mark}{claim.verdict.value}{mark}: {claim.text} ({claim.asked}: {said}.)")
     return lines
 

@@ -6,12 +6,13 @@ from statistics import median
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.documents.tables import Table
+from navirl_cli.evaluation.compare import DRIVEN
+from navirl_cli.evaluation.groups import GroupMetrics, mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt
-from navirl_cli.study.measures import GroupProperties, mean_and_spread
 from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
 from navirl_cli.study.questionnaire import Shares
 
@@ -22,9 +23,9 @@ def claims_table(claims: Iterable[Claim]) -> Table:
         (
             claim.title,
             one.what,
-            signed(one.mean, one.unit),
-            f"{signed(one.lower)} to {signed(one.upper)}" if isfinite(one.lower) else "-",
-            str(len(one.values)),
+            signed(one.paired.mean, one.unit),
+            " to ".join(map(signed, one.paired.student)) if isfinite(one.paired.student.lower) else "-",
+            str(one.paired.n),
             "-" if one.margin is None else f"± {one.margin:.3f}",
             ", ".join(one.against) or "-",
             one.verdict.value,
@@ -47,7 +48,7 @@ def completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]
     )
 
 
-def properties_table(groups: Sequence[GroupProperties]) -> Table:
+def properties_table(groups: Sequence[GroupMetrics]) -> Table:
     """Properties of driven paths by group."""
     header = (
         "paths",
@@ -57,12 +58,13 @@ def properties_table(groups: Sequence[GroupProperties]) -> Table:
         "leaves before person m",
     )
     rows = []
-    for group in groups:
-        mean, std = group.driven.mean, group.driven.std
-        own = [plus_minus(mean[m.name], std[m.name], 3) for m in PAPER_METRICS]
-        rest = [plus_minus(*group.center_distance_m, 3), plus_minus(*group.onset_m, 3)]
-        rest[1] += f" ({group.onsets})" if group.onsets else ""
-        rows.append((group.group, str(group.driven.count), *own, *rest))
+    for row in groups:
+        if row.kind != DRIVEN:
+            continue
+        names = [*(m.name for m in PAPER_METRICS), "min_center_distance_m", "onset_m"]
+        own = [plus_minus(row.mean[name], row.std[name], 3) for name in names]
+        own[-1] += f" ({row.counts['onset_m']})" if row.counts["onset_m"] else ""
+        rows.append((row.group, str(row.count), *own))
     return Table.of_texts(header, tuple(rows), "Driven paths, mean ± standard deviation over paths.")
 
 
@@ -150,8 +152,8 @@ def _with_error(value: float, error: float) -> str:
 
 
 def _shown_and_expected(near: Closeness) -> list[str]:
-    pairs = (
-        (near.demonstrated, near.demonstrated_spread),
-        (near.expected, near.spread),
-    )
-    return [plus_minus(mean[m.name], spread[m.name], 2) for m in PAPER_METRICS for mean, spread in pairs]
+    return [
+        plus_minus(row.expected(m.name), row.std[m.name], 2)
+        for m in PAPER_METRICS
+        for row in (near.demonstrated, near.learnt)
+    ]

@@ -1,19 +1,21 @@
 """What the paper says of its paths, asked of the participants at hand, in differences with intervals."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
+from navirl_cli.evaluation.groups import Measured, by_participant
+from navirl_cli.evaluation.metrics import LEAVES_M, PAPER_METRICS, Metric
+from navirl_cli.evaluation.paired import Paired, paired
 from navirl_cli.study.learning import Learnt
-from navirl_cli.study.measures import LEAVES_M, Measured, by_participant, mean_and_spread
+from navirl_cli.study.measures import with_people
 
 SECOND_CYCLE, JOYSTICK, REPLAY = "force, cycle 2", "joystick", "replay of the learnt policy"
 #: Groups of a robot that only avoids obstacles: as an imported study calls them, and as a log that says no more.
 AVOIDANCE = ("obstacle avoidance", "autonomous")
-LEVEL = 0.95
 
 
 class Verdict(StrEnum):
@@ -26,16 +28,11 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Difference:
-    """A paired difference between two kinds of paths, over participants."""
+    """A paired difference between two types of paths, over participants."""
 
     what: str
     unit: str
-    #: Mean over participants, and its interval from Student's t; NaN for a single one.
-    mean: float
-    lower: float
-    upper: float
-    #: By participant.
-    values: Mapping[str, float]
+    paired: Paired
     #: For closeness: how far a participant's own second-cycle paths scatter, within which paths count as close.
     margin: float | None = None
 
@@ -43,18 +40,19 @@ class Difference:
     def against(self) -> list[str]:
         """Participants whose own difference speaks against the claim."""
         if self.margin is None:
-            return [name for name, value in self.values.items() if value <= 0]
-        return [name for name, value in self.values.items() if abs(value) >= self.margin]
+            return [name for name, value in self.paired.differences.items() if value <= 0]
+        return [name for name, value in self.paired.differences.items() if abs(value) >= self.margin]
 
     @property
     def verdict(self) -> Verdict:
         """Close: the interval within the margin, or beyond it. Larger: the interval above 0, or below it."""
         low, high = (0.0, np.inf) if self.margin is None else (-self.margin, self.margin)
-        if not np.isfinite([self.lower, self.upper]).all():
+        lower, upper = self.paired.student
+        if not np.isfinite([lower, upper]).all():
             return Verdict.OPEN
-        if low < self.lower and self.upper < high:
+        if low < lower and upper < high:
             return Verdict.HOLDS
-        return Verdict.FAILS if self.upper < low or self.lower > high else Verdict.OPEN
+        return Verdict.FAILS if upper < low or lower > high else Verdict.OPEN
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,7 @@ def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]
         rows: Measured paths.
         learnt: Fits by participant; a pooled one is passed over.
     """
-    rows = [row for row in rows if np.isfinite(row.center_distance_m)]  # as the tables have it: where there are people
+    rows = with_people(rows)  # as in the tables
     groups = {row.group for row in rows}
     avoidance = next((group for group in AVOIDANCE if group in groups), None)
     claims = [
@@ -96,54 +94,47 @@ def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]
     return [claim for claim in claims if claim.differences]
 
 
-def paired(what: str, unit: str, one: Mapping[str, float], other: Mapping[str, float]) -> Difference | None:
-    """One less the other over the participants who have both; None where nobody has.
-
-    Args:
-        what: Of what.
-        unit: Of the values.
-        one: Values by participant.
-        other: Values by participant.
-    """
-    from scipy.stats import t
-
-    both = {name: one[name] - other[name] for name in one if name in other}
-    if not both:
-        return None
-    mean, spread = mean_and_spread(both.values())
-    several = len(both) > 1
-    half = float(t.ppf((1 + LEVEL) / 2, len(both) - 1) * spread / np.sqrt(len(both))) if several else float("nan")
-    return Difference(what, unit, mean, mean - half, mean + half, both)
+def _difference(
+    what: str, unit: str, one: Mapping[str, float], other: Mapping[str, float], margin: float | None = None
+) -> Difference | None:
+    """One minus the other; None where no participant has both."""
+    found = paired(one, other)
+    return Difference(what, unit, found, margin) if found.n else None
 
 
 def _kept(differences: Sequence[Difference | None]) -> tuple[Difference, ...]:
     return tuple(difference for difference in differences if difference is not None)
 
 
-def _metric(name: str, kind: str = "driven") -> Callable[[Measured], float]:
-    """A metric of a measured path."""
-    return lambda row: float(getattr(row, kind)[name])
+def _of(rows: Sequence[Measured], group: str, name: str, kind: str = DRIVEN) -> Mapping[str, float]:
+    """A metric in a group, by participant."""
+    return by_participant([row for row in rows if row.group == group], kind, name)
 
 
 def _close(
     rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
 ) -> tuple[Difference, ...]:
-    """Each metric's values less the second cycle's, with the scatter within participants as the margin."""
-    found = []
-    for metric in metrics:
-        value = _metric(metric.name, kind)
-        difference = paired(metric.label, metric.unit, one(metric.name), by_participant(rows, SECOND_CYCLE, value))
-        if difference is not None:
-            found.append(replace(difference, margin=scatter_within(rows, value)))
-    return tuple(found)
+    """Each metric's values minus the second cycle's, with the scatter within participants as the margin."""
+    return _kept(
+        [
+            _difference(
+                metric.label,
+                metric.unit,
+                one(metric.name),
+                _of(rows, SECOND_CYCLE, metric.name, kind),
+                scatter_within(rows, kind, metric.name),
+            )
+            for metric in metrics
+        ]
+    )
 
 
-def scatter_within(rows: Sequence[Measured], value: Callable[[Measured], float]) -> float:
+def scatter_within(rows: Sequence[Measured], kind: str, name: str) -> float:
     """Pooled standard deviation of a participant's second-cycle paths about their own mean; NaN where all have one."""
     own: dict[str, list[float]] = {}
     for row in rows:
         if row.group == SECOND_CYCLE:
-            own.setdefault(row.participant, []).append(value(row))
+            own.setdefault(row.participant, []).append(row.values[kind][name])
     squares = sum(float(np.var(values)) * len(values) for values in own.values())
     freedom = sum(len(values) - 1 for values in own.values())
     return float(np.sqrt(squares / freedom)) if freedom else float("nan")
@@ -155,7 +146,7 @@ def _replays(rows: Sequence[Measured]) -> Claim:
         "replays",
         "The learnt policy's paths are close to those of the second force cycle (replays that the robot drove).",
         f"Replay of the learnt policy less {SECOND_CYCLE}, driven paths",
-        _close(rows, "driven", lambda name: by_participant(rows, REPLAY, _metric(name)), PAPER_METRICS),
+        _close(rows, DRIVEN, lambda name: _of(rows, REPLAY, name), PAPER_METRICS),
     )
 
 
@@ -168,8 +159,8 @@ def _expected(rows: Sequence[Measured], learnt: Sequence[Learnt], *, own: bool) 
             near[one.participant] = of_cycle.near
     # Length is a feature of the reward: a policy expects the mean length of whatever it was learnt from.
     metrics = [metric for metric in PAPER_METRICS if not own or metric.name != "length_m"]
-    expected = {m.name: {who: float(one.expected[m.name]) for who, one in near.items()} for m in metrics}
-    differences = _close(rows, "on_grid", lambda name: expected[name], metrics)
+    expected = {m.name: {who: one.learnt.expected(m.name) for who, one in near.items()} for m in metrics}
+    differences = _close(rows, ON_GRID, lambda name: expected[name], metrics)
     if own:
         title = "goodness of fit"
         text = "The learnt policy's paths are close to those of the second force cycle, from which it was learnt."
@@ -181,12 +172,12 @@ def _expected(rows: Sequence[Measured], learnt: Sequence[Learnt], *, own: bool) 
 
 def _joystick(rows: Sequence[Measured]) -> Claim:
     """Distances."""
-    distance = [by_participant(rows, group, lambda row: row.center_distance_m) for group in (JOYSTICK, SECOND_CYCLE)]
+    joystick, force = (_of(rows, group, "min_center_distance_m") for group in (JOYSTICK, SECOND_CYCLE))
     return Claim(
         "joystick",
         "Paths steered by joystick keep a larger distance to the person than paths of the second force cycle.",
         f"Joystick less {SECOND_CYCLE}, driven paths",
-        _kept([paired("min. distance", "m", *distance)]),
+        _kept([_difference("min. distance", "m", joystick, force)]),
     )
 
 
@@ -197,22 +188,21 @@ def _who(avoidance: str) -> str:
 
 def _latest(rows: Sequence[Measured], avoidance: str) -> Claim:
     """Where paths leave the nominal one."""
-    onset = [by_participant(rows, group, lambda row: row.onset_m) for group in (SECOND_CYCLE, avoidance)]
+    wished, alone = (_of(rows, group, "onset_m") for group in (SECOND_CYCLE, avoidance))
     return Claim(
         "late avoidance",
         f"{_who(avoidance)} begins to give way later than people wish.",
         f"Way left to the person when the path is {LEAVES_M:g} m off the nominal one: {SECOND_CYCLE} less {avoidance}",
-        _kept([paired("way left to the person", "m", *onset)]),
+        _kept([_difference("way left to the person", "m", wished, alone)]),
     )
 
 
 def _smallest(rows: Sequence[Measured], avoidance: str, others: Sequence[str]) -> Claim:
     """Areas under all paths."""
-    area = _metric("area_m2")
-    least = by_participant(rows, avoidance, area)
+    least = _of(rows, avoidance, "area_m2")
     return Claim(
         "smallest area",
         f"{_who(avoidance)} takes the paths with the smallest area under them.",
         f"Each other group less {avoidance}, driven paths",
-        _kept([paired(f"area, {group}", "m²", by_participant(rows, group, area), least) for group in others]),
+        _kept([_difference(f"area, {group}", "m²", _of(rows, group, "area_m2"), least) for group in others]),
     )

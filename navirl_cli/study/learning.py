@@ -10,7 +10,7 @@ from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import NavirlError
 from navirl_cli.evaluation.compare import LEARNT, ON_GRID, compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.metrics import Values
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.reward import Reward
@@ -23,14 +23,9 @@ class Closeness(ByContent):
     """Properties of a learnt policy's paths beside those of the demonstrations in the same scenes."""
 
     #: Of the demonstrated paths through the centres of their cells, as the policy's paths go.
-    demonstrated: Values
-    demonstrated_spread: Values
-    #: Under the policy: expected value and standard deviation of one path.
-    expected: Values
-    spread: Values
-    #: Monte Carlo standard error of the expected value; 0 of the length, which is exact.
-    error: Values
-    demonstrations: int
+    demonstrated: GroupMetrics
+    #: Of the policy's paths.
+    learnt: GroupMetrics
 
 
 @dataclass(frozen=True)
@@ -135,11 +130,4 @@ def closeness(
     """
     found = compare(demonstrations, {LEARNT: reward}, Precision(samples), rng).groups
     shown, learnt = (next(row for row in found if row.kind == kind) for kind in (ON_GRID, LEARNT))
-    return Closeness(
-        demonstrated=shown.mean,
-        demonstrated_spread=shown.std,
-        expected={**learnt.mean, **learnt.exact},
-        spread=learnt.std,
-        error={**learnt.error, **dict.fromkeys(learnt.exact, 0.0)},
-        demonstrations=len(demonstrations),
-    )
+    return Closeness(shown, learnt)

@@ -1,42 +1,21 @@
 """What the paths of a study are like, trial by trial and group by group."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, GroupMetrics, by_group, group_of, nominal_of, summary_of
-from navirl_cli.evaluation.metrics import Values, paper_values
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, nominal_of
+from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
+from navirl_cli.evaluation.metrics import onset_m, paper_values
 from navirl_cli.irl.scene import Scene, scenes_of
-
-#: A path has left the nominal one where it is farther from it than this, m: a cell and a half.
-LEAVES_M = 0.15
-
-
-@dataclass(frozen=True, eq=False)
-class Measured(ByContent):
-    """One trial's path."""
-
-    id: str
-    participant: str
-    group: str
-    driven: Values
-    #: Through the centres of its cells, comparable with learnt paths.
-    on_grid: Values
-    #: Least distance between the robot's centre and a person's, m; NaN where there is nobody.
-    center_distance_m: float
-    #: How far before the first person, along the nominal path, the robot left it, m; NaN where it never did, or did not
-    #: start on it.
-    onset_m: float
 
 
 def measured(demonstrations: Sequence[Demonstration]) -> list[Measured]:
-    """Measure every path.
+    """Measure every path as driven and through the centres of its cells, comparable with learnt paths.
 
     Raises:
-        SceneError: A demonstration's scene has no way from start to goal.
+        SceneError: A demonstration's scene has no path from start to goal.
     """
     return [_measured(one, scene) for one, scene in zip(demonstrations, scenes_of(demonstrations), strict=True)]
 
@@ -44,97 +23,28 @@ def measured(demonstrations: Sequence[Demonstration]) -> list[Measured]:
 def _measured(one: Demonstration, scene: Scene) -> Measured:
     nominal = nominal_of(one, scene)
     driven, on_grid = (
-        paper_values(line, nominal, one.people_m, one.robot_radius_m)
+        dict(paper_values(line, nominal, one.people_m, one.robot_radius_m))
         for line in (one.xy_m, one.grid.centres_of(one.cells))
     )
-    return Measured(
-        id=one.id,
-        participant=one.participant,
-        group=group_of(one),
-        driven=driven,
-        on_grid=on_grid,
-        center_distance_m=driven["min_distance_m"] + one.robot_radius_m,
-        onset_m=onset_m(one.xy_m, nominal, one.people_m),
-    )
+    driven["min_center_distance_m"] = driven["min_distance_m"] + one.robot_radius_m
+    driven["onset_m"] = onset_m(one.xy_m, nominal, one.people_m)
+    return Measured(one.id, one.participant, group_of(one), {DRIVEN: driven, ON_GRID: on_grid})
 
 
-def onset_m(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray) -> float:
-    """How far before the first person a path leaves the nominal one, along it.
-
-    Args:
-        line_m: (n, 2) m, the path.
-        nominal_m: (k, 2) m.
-        people_m: (p, 2) m.
-
-    Returns:
-        m; negative where it leaves behind the first person; NaN where there is nobody, or the path never leaves the
-        nominal one by LEAVES_M, or starts away from it.
-    """
-    from shapely import LineString, distance, line_locate_point, points
-
-    nominal = LineString(nominal_m)
-    away = distance(points(line_m), nominal)
-    if len(people_m) == 0 or away[0] > LEAVES_M or away.max() <= LEAVES_M:
-        return float("nan")
-    left = int(np.argmax(away > LEAVES_M))
-    share = (LEAVES_M - away[left - 1]) / (away[left] - away[left - 1])
-    where = line_m[left - 1] + share * (line_m[left] - line_m[left - 1])
-    person = float(line_locate_point(nominal, points(people_m)).min())
-    return person - float(line_locate_point(nominal, points(where)))
+def with_people(rows: Iterable[Measured]) -> list[Measured]:
+    """The trials in whose scene there are people."""
+    return [row for row in rows if np.isfinite(row.values[DRIVEN]["min_center_distance_m"])]
 
 
-@dataclass(frozen=True, eq=False)
-class GroupProperties(ByContent):
-    """Properties of the paths of one group, over its trials with people."""
-
-    group: str
-    driven: GroupMetrics
-    on_grid: GroupMetrics
-    #: Distance between centres and onset, m: mean and sample standard deviation.
-    center_distance_m: tuple[float, float]
-    onset_m: tuple[float, float]
-    #: Number of paths that have an onset.
-    onsets: int
-    participants: int
-
-
-def groups_of(demonstrations: Iterable[Demonstration], rows: Iterable[Measured]) -> list[GroupProperties]:
-    """Properties by group, in the order of the tables; groups without people are left out.
+def groups_of(demonstrations: Iterable[Demonstration], rows: Iterable[Measured]) -> list[GroupMetrics]:
+    """Properties of the trials with people, by group in the order of the tables, then as driven and on the grid.
 
     Args:
         demonstrations: Of the study.
-        rows: Their measures.
+        rows: What was measured of them.
     """
     members: dict[str, list[Measured]] = {}
-    for row in rows:
-        if np.isfinite(row.center_distance_m):
-            members.setdefault(row.group, []).append(row)
-    return [_properties(group, members[group]) for group in by_group(demonstrations) if group in members]
-
-
-def _properties(group: str, rows: Sequence[Measured]) -> GroupProperties:
-    return GroupProperties(
-        group,
-        summary_of(group, DRIVEN, [row.driven for row in rows]),
-        summary_of(group, ON_GRID, [row.on_grid for row in rows]),
-        mean_and_spread([row.center_distance_m for row in rows]),
-        mean_and_spread([row.onset_m for row in rows]),
-        int(np.isfinite([row.onset_m for row in rows]).sum()),
-        len({row.participant for row in rows}),
-    )
-
-
-def mean_and_spread(values: Iterable[float]) -> tuple[float, float]:
-    """Mean and sample standard deviation of the finite values; NaN where they are too few."""
-    known = np.array([value for value in values if np.isfinite(value)])
-    mean = float(known.mean()) if len(known) else float("nan")
-    return mean, float(known.std(ddof=1)) if len(known) > 1 else float("nan")
-
-
-def by_participant(rows: Iterable[Measured], group: str, value: Callable[[Measured], float]) -> Mapping[str, float]:
-    """Mean of a value over each participant's trials of a group; who has none finite is not in it."""
-    values: dict[str, list[float]] = {}
-    for row in rows:
-        if row.group == group and np.isfinite(value(row)):
-            values.setdefault(row.participant, []).append(value(row))
-    return {participant: float(np.mean(known)) for participant, known in values.items()}
+    for row in with_people(rows):
+        members.setdefault(row.group, []).append(row)
+    known = [group for group in by_group(demonstrations) if group in members]
+    return [summary_of(group, kind, members[group]) for group in known for kind in (DRIVEN, ON_GRID)]

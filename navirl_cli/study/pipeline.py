@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.parallel import map_in_order
 from navirl_cli.study.claims import Claim, claims_of
 from navirl_cli.study.learning import SECOND, Learnt, is_of_cycle, jobs_of, learn
-from navirl_cli.study.measures import GroupProperties, Measured, groups_of, measured
+from navirl_cli.study.measures import groups_of, measured
 
 #: What the paper's authors learnt from the second cycles of their 13 participants, in SI units. Source: their published
 #: parameters c0 = -5.412586, a_g = -0.873514, a_p = -4.907188 and a width of 5.456288 cells, per cell of 0.1 m.
@@ -31,7 +32,8 @@ class Study:
 
     demonstrations: tuple[Demonstration, ...]
     rows: tuple[Measured, ...]
-    groups: tuple[GroupProperties, ...]
+    #: Of the trials with people: by group, as driven and on the grid.
+    groups: tuple[GroupMetrics, ...]
     #: By participant, in order of their logs.
     participants: tuple[Learnt, ...]
     pooled: Learnt

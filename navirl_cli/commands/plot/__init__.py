@@ -124,8 +124,9 @@ def _bars(
     """What was driven in every group, and in the groups that the policy was learnt from what it drives."""
     import numpy as np
 
-    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare, group_of
+    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
     from navirl_cli.evaluation.drawn import Precision
+    from navirl_cli.evaluation.groups import group_of
     from navirl_cli.figures.properties import bars_of
 
     with progress_bar("evaluate", len(demonstrations)) as update:

@@ -109,7 +109,7 @@ def _groups(demonstrations: Sequence["Demonstration"], names: Sequence[str]) -> 
     Raises:
         DemonstrationError: There is none of a group.
     """
-    from navirl_cli.evaluation.compare import by_group
+    from navirl_cli.evaluation.groups import by_group
 
     known = by_group(demonstrations)
     for name in names:

@@ -83,7 +83,8 @@ class Sight:
         """Paths to be drawn over the map, driven ones below."""
         import numpy as np
 
-        from navirl_cli.evaluation.compare import LEARNT, by_group
+        from navirl_cli.evaluation.compare import LEARNT
+        from navirl_cli.evaluation.groups import by_group
         from navirl_cli.figures.overlay import Overlay, alike
         from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 

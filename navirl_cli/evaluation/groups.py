@@ -1,0 +1,137 @@
+"""Groups of demonstrations: who belongs to which, and mean and spread over a group or over participants."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from navirl_cli.arrays import ByContent
+from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.evaluation.metrics import Values
+
+#: Of all intervals.
+LEVEL = 0.95
+#: By what demonstrations can be grouped.
+FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
+    "condition": lambda one: one.condition.value,
+    "cycle": lambda one: "no cycle" if one.cycle is None else f"cycle {one.cycle}",
+    "set": lambda one: one.set or "main task",
+    "participant": lambda one: one.participant,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class GroupMetrics(ByContent):
+    """Mean and spread of the paths of one kind in one group of demonstrations."""
+
+    group: str
+    kind: str
+    #: Number of demonstrations.
+    count: int
+    mean: Values
+    #: Sample standard deviation (n - 1) over demonstrations, or of one path under the policy; NaN for one path.
+    std: Values
+    #: Of learnt paths: Monte Carlo standard error of the mean.
+    error: Values = field(default_factory=dict)
+    #: Of learnt paths: exact expected values, where visits give them.
+    exact: Values = field(default_factory=dict)
+    #: Of other paths: half the 95 % interval of the mean, participants counting with their own means (Student); NaN
+    #: for one participant.
+    half_interval: Values = field(default_factory=dict)
+    #: Of other paths: number of participants, and of paths with a value by metric.
+    participants: int = 0
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    def expected(self, name: str) -> float:
+        """Mean of a metric, the exact one where there is one; NaN where there is none."""
+        return self.exact.get(name, self.mean.get(name, float("nan")))
+
+    def monte_carlo_error(self, name: str) -> float:
+        """Standard error of :meth:`expected` of paths that were drawn; 0 where it is exact."""
+        return 0.0 if name in self.exact else self.error.get(name, float("nan"))
+
+
+@dataclass(frozen=True, eq=False)
+class Measured(ByContent):
+    """What was measured of one demonstration's paths."""
+
+    id: str
+    participant: str
+    group: str
+    #: By type of path, then by metric.
+    values: Mapping[str, Values]
+
+
+def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
+    """Demonstrations by group: force first, by cycle, then joystick, then autonomous; special sets after the rest."""
+    order = list(Condition)
+    groups: dict[str, list[Demonstration]] = {}
+    for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.set or "", one.cycle or 0)):
+        groups.setdefault(group_of(one, fields), []).append(one)
+    return groups
+
+
+def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
+    """The group of a demonstration: its condition, its cycle and its set where known, or what fields of FIELDS say.
+
+    A robot that drives by itself is what its set says: "obstacle avoidance".
+    """
+    if fields:
+        return ", ".join(of(demonstration) for name, of in FIELDS.items() if name in fields)
+    alone = demonstration.condition is Condition.AUTONOMOUS and demonstration.set is not None
+    condition = [] if alone else [demonstration.condition.value]
+    cycle = [] if demonstration.cycle is None else [f"cycle {demonstration.cycle}"]
+    return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
+
+
+def summary_of(group: str, kind: str, rows: Iterable[Measured]) -> GroupMetrics:
+    """Mean, standard deviation and interval over a group's paths of one type, those with a value each.
+
+    Args:
+        group: Its name.
+        kind: The type of path.
+        rows: What was measured of the group; demonstrations without this type of path do not count.
+    """
+    paths = [row for row in rows if kind in row.values]
+    mean, std, half, counts = {}, {}, {}, {}
+    for name in dict.fromkeys(name for row in paths for name in row.values[kind]):
+        values = [value for row in paths if np.isfinite(value := row.values[kind].get(name, np.nan))]
+        mean[name], std[name] = mean_and_spread(values)
+        half[name] = student_half_width(by_participant(paths, kind, name).values())
+        counts[name] = len(values)
+    people = len({row.participant for row in paths})
+    return GroupMetrics(group, kind, len(paths), mean, std, half_interval=half, participants=people, counts=counts)
+
+
+def by_participant(rows: Iterable[Measured], kind: str, name: str) -> dict[str, float]:
+    """Mean of a metric over each participant's finite values; participants without one are left out.
+
+    Args:
+        rows: What was measured.
+        kind: The type of path.
+        name: The metric.
+    """
+    values: dict[str, list[float]] = {}
+    for row in rows:
+        value = row.values.get(kind, {}).get(name, np.nan)
+        if np.isfinite(value):
+            values.setdefault(row.participant, []).append(value)
+    return {participant: float(np.mean(own)) for participant, own in values.items()}
+
+
+def mean_and_spread(values: Iterable[float]) -> tuple[float, float]:
+    """Mean and sample standard deviation (n - 1) of the finite values; NaN for none, and for one."""
+    known = np.array([value for value in values if np.isfinite(value)])
+    mean = float(known.mean()) if len(known) else float("nan")
+    return mean, float(known.std(ddof=1)) if len(known) > 1 else float("nan")
+
+
+def student_half_width(values: Iterable[float]) -> float:
+    """Half the width of Student's 95 % interval of the mean of finite values; NaN for fewer than two."""
+    from scipy.special import stdtrit  # scipy.stats holds the same quantile behind an import of half a second
+
+    known = [value for value in values if np.isfinite(value)]
+    if len(known) < 2:
+        return float("nan")
+    _, std = mean_and_spread(known)
+    return float(stdtrit(len(known) - 1, (1 + LEVEL) / 2) * std / np.sqrt(len(known)))
