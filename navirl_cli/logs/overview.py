@@ -17,7 +17,7 @@ from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
-from navirl_cli.logs.roles.topics import Choice, Topic, choices, is_missed, topics_of
+from navirl_cli.logs.roles.topics import Choice, Topic, choose, is_missing, topics_of
 from navirl_cli.logs.sources import Source
 from navirl_cli.logs.tf.transforms import Link, links_of
 from navirl_cli.logs.tf.tree import TransformTree
@@ -74,32 +74,32 @@ class Overview:
     @property
     def needed(self) -> tuple[str, ...]:
         """What extract cannot do without and the log does not hold."""
-        return tuple(role for role, choice in self.choices.items() if is_missed(choice, self.choices))
+        return tuple(role for role, choice in self.choices.items() if is_missing(choice, self.choices))
 
 
 def overview(
-    source: Source, chosen: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
+    source: Source, requested: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
 ) -> Overview:
     """Look over a recording.
 
     Args:
         source: Its files.
-        chosen: Topics by role where the user says so.
+        requested: Names of topics by role, where the user named some.
         check: Read every message, so that damage inside of chunks shows too.
         progress: Called with bytes done and bytes in all.
 
     Raises:
-        LogError: A file is no MCAP file, or a chosen topic does not fit.
+        LogError: A file is no MCAP file, or a requested topic does not fit.
     """
     with ExitStack() as stack:
         files = [stack.enter_context(open_log(path)) for path in source.files]
-        return _looked_over(source, files, chosen, progress, check=check)
+        return _looked_over(source, files, requested, progress, check=check)
 
 
 def _looked_over(
     source: Source,
     files: Sequence[RawFile],
-    chosen: Mapping[str, Sequence[str]],
+    requested: Mapping[str, Sequence[str]],
     progress: Progress | None,
     *,
     check: bool,
@@ -121,7 +121,7 @@ def _looked_over(
         _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start or 0, sample.stamped.get(name))
         for name, topic in topics.items()
     )
-    picked = choices(source.name, topics, chosen)
+    choices = choose(source.name, topics, requested)
     inside = _checked(files, progress) if check else [note for one in contents for note in one.damage]
     return Overview(
         source,
@@ -129,9 +129,9 @@ def _looked_over(
         start,
         max(ends, default=None),
         flows,
-        picked,
+        choices,
         tuple(map(str, (*source.damage, *inside))),
-        tuple(_clocks(picked, sample.stamped)),
+        tuple(_clocks(choices, sample.stamped)),
         sample.frames,
     )
 
@@ -177,9 +177,9 @@ def _count(batch: Batch) -> int:
     return len(batch.starts)
 
 
-def _clocks(picked: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
+def _clocks(choices: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
     """What is odd about the clocks of the topics that an extraction would take."""
-    names = {role: [topic.name for topic in choice.topics] for role, choice in picked.items() if choice.topics}
+    names = {role: [topic.name for topic in choice.topics] for role, choice in choices.items() if choice.topics}
     reference = next((name for role in _CLOCKS for name in names.get(role, ())), "")
     if reference not in stamped:
         return []
@@ -256,7 +256,7 @@ def _first_messages(files: Sequence[RawFile]) -> _Sample:
 
 def _decoder(channel: Channel) -> Decoder | None:
     """A decoder of a channel's stamps, or of all of its transforms; None where it has none or cannot be decoded."""
-    tf = full_name(channel.schema_name) == message_types.TF.type_name
+    tf = full_name(channel.schema_name) == message_types.TF.name
     paths = tuple(message_types.TF.fields.values()) if tf else (_STAMP,)
     try:
         schema = parse_definition(
