@@ -6,7 +6,8 @@ import pytest
 from log_factory import Message
 
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.roles.plausible import FORCES, PLACES, Limits, plausible_messages, plausible_rotations
+from navirl_cli.logs.roles.plausible import FORCES, PLACES, Limits, plausible_messages
+from navirl_cli.logs.tf.transforms import Curve, Link, are_rotations
 
 NONE = (float("nan"), float("inf"), float("-inf"), 1e300, -2e5)
 
@@ -91,8 +92,16 @@ def test_places_may_stay_and_leap_but_not_there_and_back():
 def test_rotations():
     turns = [(0, 0, 0, 1), (0, 0, 0.7071, 0.7071), (0, 0, 0, 0.95), (0, 0, 0, -1)]
     none = [(0, 0, 0, 0), (0, 0, 0, 1.2), (0, 0, 1e300, 1), (np.nan, 0, 0, 1), (0, 0, np.inf, 1), (0.5, 0, 0, 0.5)]
-    assert plausible_rotations(np.array(turns, dtype=float)).tolist() == [True] * 4
-    assert plausible_rotations(np.array(none, dtype=float)).tolist() == [False] * 6
+    assert are_rotations(np.array(turns, dtype=float)).tolist() == [True] * 4
+    assert are_rotations(np.array(none, dtype=float)).tolist() == [False] * 6
+
+
+@pytest.mark.parametrize("length", [0.89, 0.91, 1.0, 1.09, 1.11])
+def test_odometry_and_tf_take_the_same_quaternions(length):
+    quaternion = np.array([[0.0, 0.0, length, 0.0]])
+    link = Link("map", "odom", np.ones(1, dtype=np.int64), np.zeros((1, 3)), quaternion)
+    _, ignored = Curve.of([link], "map", "odom", fixed=False, zeros=False)
+    assert are_rotations(quaternion).tolist() == [ignored == 0] == [0.9 < length < 1.1]
 
 
 @pytest.mark.parametrize(

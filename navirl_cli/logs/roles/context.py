@@ -45,11 +45,9 @@ class Context:
         """Whether a frame is the fixed one."""
         return frame.lstrip("/") == self.fixed.lstrip("/")
 
-    def plausible(
-        self, columns: Columns, limits: Limits, *names: str, are_rotations: BoolArray | None = None
-    ) -> Columns:
+    def plausible(self, columns: Columns, limits: Limits, *names: str, rotations: BoolArray | None = None) -> Columns:
         """The messages whose measurements are plausible; the others are noted as lost."""
-        good, problem = plausible_messages(columns.topic, columns.stacked(*names), limits, are_rotations)
+        good, problem = plausible_messages(columns.topic, columns.stacked(*names), limits, rotations)
         if not problem:
             return columns
         self.lose(problem)

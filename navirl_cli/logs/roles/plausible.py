@@ -11,8 +11,6 @@ from navirl_cli.arrays import BoolArray, FloatArray
 _BLOCK: Final = 1 << 15
 #: A number this small between two that are not comes from a flipped exponent.
 _TINY, _ORDINARY = 1e-30, 1e-12
-#: Lengths of a rotation's quaternion, which is 1 but for rounding.
-_QUATERNION: Final = (0.9, 1.1)
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ PLACES: Final = Limits(1e6, 1.0, "m")
 
 
 def plausible_messages(
-    topic: str, values: FloatArray, limits: Limits, are_rotations: BoolArray | None = None
+    topic: str, values: FloatArray, limits: Limits, rotations: BoolArray | None = None
 ) -> tuple[BoolArray, str]:
     """Which messages of a topic are plausible, and what is wrong with the others.
 
@@ -41,7 +39,7 @@ def plausible_messages(
         topic: Its name.
         values: (n, k) in order of time.
         limits: Of the quantity.
-        are_rotations: (n,) whether a message's quaternion is a rotation; None for messages without rotations.
+        rotations: (n,) whether a message's quaternion is a rotation; None for messages without rotations.
 
     Returns:
         (n,) False where one of the k is not finite, larger than possible, a single spike, or the result of a flipped
@@ -52,10 +50,10 @@ def plausible_messages(
     good: BoolArray = np.array(~impossible.any(axis=1))
     finite = np.isfinite(values).all(axis=1)
     found = {"not finite": ~finite}
-    if are_rotations is not None:
-        found["without a rotation"] = finite & ~are_rotations
-        good = good & are_rotations
-    absurd = finite & impossible.any(axis=1) & (are_rotations if are_rotations is not None else True)
+    if rotations is not None:
+        found["without a rotation"] = finite & ~rotations
+        good = good & rotations
+    absurd = finite & impossible.any(axis=1) & (rotations if rotations is not None else True)
     if absurd.any():
         numbers = values[absurd][impossible[absurd]]
         example = numbers[np.abs(np.log10(np.maximum(np.abs(numbers), 1e-300))).argmax()]
@@ -67,15 +65,6 @@ def plausible_messages(
         good,
         f"{int((~good).sum())} messages on {topic} hold implausible values ({', '.join(counts)}); left out",
     )
-
-
-def plausible_rotations(quaternions: FloatArray) -> BoolArray:
-    """(n,) whether (n, 4) quaternions are rotations."""
-    # clipped, since the square of a damaged number may be too large for a float
-    squares = np.square(np.clip(quaternions, -2.0, 2.0)).sum(axis=1)
-    low, high = _QUATERNION
-    good: BoolArray = (squares > low**2) & (squares < high**2)
-    return good
 
 
 def _impossible(values: FloatArray, limits: Limits) -> BoolArray:

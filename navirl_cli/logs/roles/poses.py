@@ -11,7 +11,7 @@ from navirl_cli.logs.recording import Jump
 from navirl_cli.logs.roles.clocks import NS_PER_S
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
-from navirl_cli.logs.roles.plausible import PLACES, plausible_rotations
+from navirl_cli.logs.roles.plausible import PLACES
 
 #: Gaps of tf that are longer are not interpolated over, ns.
 GAP_NS: Final = 5 * NS_PER_S
@@ -57,11 +57,11 @@ def poses_of(columns: Columns | None, context: Context) -> Poses:
         return _from_tf(context)
     from scipy.spatial.transform import Rotation
 
-    from navirl_cli.logs.tf.transforms import Transforms
+    from navirl_cli.logs.tf.transforms import Transforms, are_rotations
 
     columns, frame = context.in_one_frame(columns)
-    are_rotations = plausible_rotations(columns.stacked(*_ROTATION))
-    columns = context.plausible(columns, PLACES, *_POSITION, are_rotations=are_rotations)
+    rotations = are_rotations(columns.stacked(*_ROTATION))
+    columns = context.plausible(columns, PLACES, *_POSITION, rotations=rotations)
     if len(columns) == 0:
         raise LogError(f"{context.log}: topic {columns.topic}: expected poses, found none that are finite")
     stamps, rows = context.ordered_times(columns)
