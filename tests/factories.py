@@ -121,3 +121,17 @@ def dense(scene: Scene, reward: Reward) -> NDArray[np.float64]:
     source, move, target = scene.lattice.edges
     matrix[source, target] = np.exp(reward.on(scene).value[source, move])
     return matrix
+
+
+def smooth_curve(seed: int, poses: int = 120) -> NDArray[np.float64]:
+    """A curve about 4 m long whose heading wanders, with uneven distances between the poses."""
+    rng = np.random.default_rng(seed)
+    heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.07, poses))
+    stride = rng.uniform(0.005, 0.06, poses)
+    return rng.uniform(-1, 1, 2) + np.cumsum(stride[:, None] * np.stack([np.cos(heading), np.sin(heading)], 1), axis=0)
+
+
+def shaken(seed: int) -> NDArray[np.float64]:
+    """A curve seen by poses with 1 cm of noise: now and then backwards, and to and fro over borders of cells."""
+    line = smooth_curve(seed)
+    return line + np.random.default_rng(seed).normal(0, 0.01, line.shape)

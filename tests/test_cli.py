@@ -103,7 +103,7 @@ def test_extract_json_has_numbers(navirl, tmp_path):
         (
             {"odometry": False},
             (),
-            "run.mcap: no odometry, and tf does not tell poses in its place: transform from 'base' to 'map'",
+            "run.mcap: no odometry, and tf does not give poses in its place: transform from 'base' to 'map'",
         ),
         ({"map": False}, (), "run.mcap: no map: expected a topic of type nav_msgs/OccupancyGrid"),
         (
@@ -114,12 +114,12 @@ def test_extract_json_has_numbers(navirl, tmp_path):
         (
             {},
             ("--topic", "wrench=/nope"),
-            "wrench=/nope: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, but there is no such topic",
+            "wrench=/nope: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, found no such topic",
         ),
         (
             {},
             ("--topic", "wrench=/odom"),
-            "geometry_msgs/Wrench, but it holds nav_msgs/Odometry",
+            "geometry_msgs/Wrench, found nav_msgs/Odometry",
         ),
         ({}, ("--topic", "lidar=/scan"), "--topic: no role is called lidar; roles are wrench, odometry, map"),
         ({"map_to_odom": False}, (), "/odom places 'base' in frame 'odom': transform from 'odom' to 'map'"),

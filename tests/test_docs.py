@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from navirl_cli.cli import COMMANDS, cli
 from navirl_cli.commands.plot import plot
 from navirl_cli.documents.tables import Format, formatted
-from navirl_cli.logs.roles.topics import ROLES
+from navirl_cli.logs.roles.topics import ROLES, short_name
 from navirl_cli.reports.evaluation import METRICS_HEADER, metric_rows
 
 ROOT = Path(__file__).parent.parent
@@ -41,7 +41,7 @@ def test_the_readme_names_every_role_with_its_types():
     for role in ROLES:
         row = re.search(rf"^\| [\w, ]*\b{role.name}\b[\w, ]* \| ([^|]*) \|", text, re.MULTILINE)
         assert row, role.name
-        assert row[1].split(", ") == [kind.type_name.replace("/msg/", "/") for kind in role.kinds], role.name
+        assert row[1].split(", ") == [short_name(one.name) for one in role.message_types], role.name
 
 
 def test_links_lead_somewhere():

@@ -158,8 +158,8 @@ def test_what_extract_would_take_follows_the_users_choice(inspect, navirl, tmp_p
     assert view["roles"]["wrench"] == {"topics": ["/other_wrench"], "reason": "named by --topic", "problem": None}
     error = navirl("inspect", path, "--topic", "wrench=/odom", code=1).stderr
     assert error == (
-        "navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, but it "
-        "holds nav_msgs/Odometry\n"
+        "navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, found "
+        "nav_msgs/Odometry\n"
     )
 
 

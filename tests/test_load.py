@@ -52,7 +52,7 @@ def test_where_an_axis_rests_is_no_deflection(load):
 def test_poses_that_are_none_are_left_out_and_counted(load):
     recording = load(odometry_nan=3, odometry_zero=4)
     assert recording.damage == (
-        "run.mcap: 7 messages on /odom hold numbers that cannot be true (3 not finite, 4 without a rotation); left out",
+        "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 without a rotation); left out",
     )
     seconds = (recording.t_ns - START_NS) / 1e9
     assert recording.xy_m == pytest.approx(position_m(seconds), abs=1e-9)
@@ -63,9 +63,7 @@ def test_poses_that_are_none_are_left_out_and_counted(load):
 def test_forces_that_are_none_are_left_out_and_counted(load):
     recording = load(wrench_nan=5)
     assert np.isfinite(recording.wrench.force_n).all()
-    assert recording.damage == (
-        "run.mcap: 5 messages on /wrench hold numbers that cannot be true (5 not finite); left out",
-    )
+    assert recording.damage == ("run.mcap: 5 messages on /wrench hold implausible values (5 not finite); left out",)
 
 
 def test_a_sensor_that_moves_on_the_robot_is_turned_back(load):
@@ -191,8 +189,8 @@ def test_a_log_of_which_something_is_lost_is_refused_where_that_is_asked(tmp_pat
     with pytest.raises(LogError) as caught:
         load_recording(path, LoadOptions(strict=True))
     assert str(caught.value) == (
-        "run.mcap: damaged, and --strict refuses it: run.mcap: 1 messages on /odom hold numbers that cannot be true "
-        "(1 not finite); left out; run.mcap: 2 messages on /wrench hold numbers that cannot be true (2 not finite); "
+        "run.mcap: damaged, and --strict refuses it: run.mcap: 1 messages on /odom hold implausible values "
+        "(1 not finite); left out; run.mcap: 2 messages on /wrench hold implausible values (2 not finite); "
         "left out"
     )
     sound = write_run(tmp_path / "sound.mcap", Run())
@@ -220,7 +218,7 @@ def test_forces_of_two_sensors_in_turn(tmp_path):
         log.add("/wrench", nav.wrench(at, 5.0, frame="other"), at)
     recording = load_recording(log.write(tmp_path / "run.mcap"))
     assert recording.damage == (
-        "run.mcap: 7 messages on /wrench are not in frame 'base_link', as the others; left out",
+        "run.mcap: 7 messages on /wrench are not in frame 'base_link', as the others are; left out",
     )
     assert len(recording.wrench.t_ns) == 400
 

@@ -6,9 +6,14 @@ import pytest
 from log_factory import Message
 
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.roles.plausible import FORCES, PLACES, Limits, describe, sound, sound_rotations
+from navirl_cli.logs.roles.plausible import FORCES, PLACES, Limits, plausible_messages
+from navirl_cli.logs.tf.transforms import Curve, Link, are_rotations
 
 NONE = (float("nan"), float("inf"), float("-inf"), 1e300, -2e5)
+
+
+def plausible(values, limits):
+    return plausible_messages("/t", values, limits)[0]
 
 
 def forces(n=60):
@@ -21,7 +26,7 @@ def forces(n=60):
 def test_what_is_no_force_is_found(number, row):
     values = forces()
     values[row, 1] = number
-    assert np.flatnonzero(~sound(values, FORCES)).tolist() == [row]
+    assert np.flatnonzero(~plausible(values, FORCES)).tolist() == [row]
 
 
 @pytest.mark.parametrize("number", NONE)
@@ -29,7 +34,7 @@ def test_what_is_no_force_is_found(number, row):
 def test_the_first_and_the_last_are_looked_at_too(number, row):
     values = forces()
     values[row] = number
-    assert np.flatnonzero(~sound(values, FORCES)).tolist() == [row]
+    assert np.flatnonzero(~plausible(values, FORCES)).tolist() == [row]
 
 
 def test_several_wrong_numbers_in_a_row():
@@ -38,7 +43,7 @@ def test_several_wrong_numbers_in_a_row():
     values[20:23, 2] = 1e200
     values[30] = np.inf
     values[40, 0], values[42, 0] = 5e-200, 900.0
-    assert np.flatnonzero(~sound(values, FORCES)).tolist() == [10, 11, 12, 20, 21, 22, 30, 40, 42]
+    assert np.flatnonzero(~plausible(values, FORCES)).tolist() == [10, 11, 12, 20, 21, 22, 30, 40, 42]
 
 
 @pytest.mark.parametrize(
@@ -62,46 +67,54 @@ def test_several_wrong_numbers_in_a_row():
     ],
 )
 def test_honest_forces_are_kept(honest):
-    good, trouble = describe("/wrench", honest, FORCES)
+    good, trouble = plausible_messages("/wrench", honest, FORCES)
     assert good.all()
     assert trouble == ""
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
 def test_few_measurements(n):
-    assert sound(forces(n), FORCES).tolist() == [True] * n
-    assert sound(np.full((n, 3), np.nan), FORCES).tolist() == [False] * n
+    assert plausible(forces(n), FORCES).tolist() == [True] * n
+    assert plausible(np.full((n, 3), np.nan), FORCES).tolist() == [False] * n
 
 
 def test_places_may_stay_and_leap_but_not_there_and_back():
     still = np.full((40, 3), 4.2)
-    assert sound(still, PLACES).all()
+    assert plausible(still, PLACES).all()
     carried = np.where(np.arange(40)[:, None] < 20, still, still + 8.0)
-    assert sound(carried, PLACES).all()
+    assert plausible(carried, PLACES).all()
     for number in (4.2 + 1.5, 2e6, 1e-200):
         values = still.copy()
         values[17, 0] = number
-        assert np.flatnonzero(~sound(values, PLACES)).tolist() == [17]
+        assert np.flatnonzero(~plausible(values, PLACES)).tolist() == [17]
 
 
 def test_rotations():
     turns = [(0, 0, 0, 1), (0, 0, 0.7071, 0.7071), (0, 0, 0, 0.95), (0, 0, 0, -1)]
     none = [(0, 0, 0, 0), (0, 0, 0, 1.2), (0, 0, 1e300, 1), (np.nan, 0, 0, 1), (0, 0, np.inf, 1), (0.5, 0, 0, 0.5)]
-    assert sound_rotations(np.array(turns, dtype=float)).tolist() == [True] * 4
-    assert sound_rotations(np.array(none, dtype=float)).tolist() == [False] * 6
+    assert are_rotations(np.array(turns, dtype=float)).tolist() == [True] * 4
+    assert are_rotations(np.array(none, dtype=float)).tolist() == [False] * 6
+
+
+@pytest.mark.parametrize("length", [0.89, 0.91, 1.0, 1.09, 1.11])
+def test_odometry_and_tf_take_the_same_quaternions(length):
+    quaternion = np.array([[0.0, 0.0, length, 0.0]])
+    link = Link("map", "odom", np.ones(1, dtype=np.int64), np.zeros((1, 3)), quaternion)
+    _, ignored = Curve.of([link], "map", "odom", fixed=False, zeros=False)
+    assert are_rotations(quaternion).tolist() == [ignored == 0] == [0.9 < length < 1.1]
 
 
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({(3, 0): np.nan}, "1 messages on /ft hold numbers that cannot be true (1 not finite); left out"),
+        ({(3, 0): np.nan}, "1 messages on /ft hold implausible values (1 not finite); left out"),
         (
             {(3, 1): 2.6e-155},
-            "1 messages on /ft hold numbers that cannot be true (1 absurd, such as 2.6e-155 N); left out",
+            "1 messages on /ft hold implausible values (1 impossible, such as 2.6e-155 N); left out",
         ),
         (
             {(3, 1): -1e300, (5, 0): np.inf, (5, 1): 1e301, (9, 2): 2500.0},
-            "3 messages on /ft hold numbers that cannot be true (1 not finite, 2 absurd, such as -1e+300 N); left out",
+            "3 messages on /ft hold implausible values (1 not finite, 2 impossible, such as -1e+300 N); left out",
         ),
     ],
 )
@@ -112,7 +125,7 @@ def test_what_was_wrong_is_told_by_the_number_that_is(values, said):
         measured[place] = number
     if (3, 1) in values:
         measured[3, 0] = 0.0
-    good, trouble = describe("/ft", measured, FORCES)
+    good, trouble = plausible_messages("/ft", measured, FORCES)
     assert trouble == said
     assert (~good).sum() == len({row for row, _ in values})
 
@@ -121,18 +134,18 @@ def test_poses_without_a_rotation_are_told_apart():
     values = np.zeros((9, 3))
     values[2, 0], values[4, 0], values[6, 0] = np.nan, 5e6, 7e6
     turned = np.array([True, False, False, True, True, True, False, True, True])
-    good, trouble = describe("/odom", values, PLACES, turned)
+    good, trouble = plausible_messages("/odom", values, PLACES, turned)
     assert good.tolist() == [True, False, False, True, False, True, False, True, True]
     assert trouble == (
-        "4 messages on /odom hold numbers that cannot be true (1 not finite, 2 without a rotation, 1 absurd, such as "
+        "4 messages on /odom hold implausible values (1 not finite, 2 without a rotation, 1 impossible, such as "
         "5e+06 m); left out"
     )
 
 
 def test_limits_are_of_the_quantity():
     values = np.array([[0.0], [3.0], [0.0], [0.0]])
-    assert sound(values, Limits(10.0, 2.0, "m/s")).tolist() == [True, False, True, True]
-    assert sound(values, Limits(2.5, 9.0, "m/s")).tolist() == [True, False, True, True]
+    assert plausible(values, Limits(10.0, 2.0, "m/s")).tolist() == [True, False, True, True]
+    assert plausible(values, Limits(2.5, 9.0, "m/s")).tolist() == [True, False, True, True]
 
 
 def test_a_flipped_exponent_in_a_file_is_told_and_left_out(tmp_path):
@@ -146,7 +159,7 @@ def test_a_flipped_exponent_in_a_file_is_told_and_left_out(tmp_path):
         log.messages[rows[number]] = Message(one.topic, one.typename, one.log_time_ns, bytes(data))
     recording = load_recording(log.write(tmp_path / "run.mcap"))
     (lost,) = recording.damage
-    assert lost.startswith("run.mcap: 2 messages on /wrench hold numbers that cannot be true (2 absurd, such as ")
+    assert lost.startswith("run.mcap: 2 messages on /wrench hold implausible values (2 impossible, such as ")
     assert len(recording.wrench.t_ns) == 598
     assert np.isfinite(recording.wrench.force_n).all()
     assert np.setdiff1d(nav.unix(np.arange(600) / 100), recording.wrench.t_ns).tolist() == [
@@ -165,10 +178,10 @@ def test_poses_people_and_goals_that_are_none_do_not_spoil_a_log(tmp_path, numbe
     log.add("/goal_pose", nav.pose_stamped(at + 1, 1.0, 2.0), at + 1)
     log.add("/people", nav.people(at, [("ann", 1.0, far), ("bob", 2.0, 2.0)]), at)
     recording = load_recording(log.write(tmp_path / "run.mcap"))
-    what = "not finite" if not np.isfinite(number) else f"absurd, such as {number:.3g} m"
+    what = "not finite" if not np.isfinite(number) else f"impossible, such as {number:.3g} m"
     why = "are not finite" if not np.isfinite(far) else "cannot be true"
     assert recording.damage == (
-        f"run.mcap: 1 messages on /odom hold numbers that cannot be true (1 {what}); left out",
+        f"run.mcap: 1 messages on /odom hold implausible values (1 {what}); left out",
         f"run.mcap: 1 places on /people left out: its numbers {why}",
         f"run.mcap: 1 messages on /goal_pose left out: its numbers {why}",
     )

@@ -8,9 +8,9 @@ from navirl_cli.errors import FrameError, LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import read
 from navirl_cli.logs.roles.clocks import Clock, TimeSource
-from navirl_cli.logs.roles.columns import Table, wants
-from navirl_cli.logs.roles.context import Setting
-from navirl_cli.logs.roles.message_types import POSES, TF
+from navirl_cli.logs.roles.columns import Columns
+from navirl_cli.logs.roles.context import Context
+from navirl_cli.logs.roles.message_types import POSES, TF, TF_STATIC
 from navirl_cli.logs.roles.poses import poses_of
 from navirl_cli.logs.tf.transforms import links_of
 from navirl_cli.logs.tf.tree import TransformTree
@@ -117,7 +117,7 @@ def test_tf_that_does_not_move_is_no_source(load):
         load(still)
     lost = Run().tf(lambda _: (0, 0)).static(nav.transform(0, "base_footprint", "base_link"))
     message = (
-        r"^run.mcap: no odometry, and tf does not tell poses in its place: transform from 'base_footprint' to 'map': "
+        r"^run.mcap: no odometry, and tf does not give poses in its place: transform from 'base_footprint' to 'map': "
         r"expected frames that connect, found base_footprint -> base_link; map -> odom; record /tf and /tf_static of "
         r"the whole run, or name other frames; record the robot's odometry$"
     )
@@ -210,7 +210,7 @@ def test_of_two_frames_in_turn_the_commoner_one_counts(load):
 
     recording = load(run.say("/odom", seen))
     check_true(recording, run, run.seconds[run.seconds < 15])
-    assert recording.damage == ("run.mcap: 100 messages on /odom are not in frame 'map', as the others; left out",)
+    assert recording.damage == ("run.mcap: 100 messages on /odom are not in frame 'map', as the others are; left out",)
 
 
 # time
@@ -255,7 +255,7 @@ def test_holes_in_tf_are_not_bridged(load):
     recording = load(run)
     # 4 s are interpolated, 7 s are not
     check_true(recording, run, run.seconds[(run.seconds < 8.025) | (run.seconds > 14.975)], (5.0, 0.0))
-    assert recording.damage == ("run.mcap: 139 poses lie where tf is silent for more than 5 s; left out",)
+    assert recording.damage == ("run.mcap: 139 poses lie in gaps of tf longer than 5 s; left out",)
 
 
 def test_holes_count_where_tf_alone_tells(load):
@@ -264,7 +264,7 @@ def test_holes_count_where_tf_alone_tells(load):
     run.tf(run.true, parent="odom", child="base_link")
     recording = load(run)
     check_true(recording, run, quiet[(quiet <= 8) | (quiet >= 15)], (5.0, 0.0))
-    assert recording.damage == ("run.mcap: 69 poses lie where tf is silent for more than 5 s; left out",)
+    assert recording.damage == ("run.mcap: 69 poses lie in gaps of tf longer than 5 s; left out",)
 
 
 def test_parents_that_change_are_told(load):
@@ -333,25 +333,23 @@ def test_poses_in_the_map_that_leap(load):
 
 @nav.needs_real
 def test_a_real_robots_odometry_agrees_with_its_localisation():
-    kinds = {"/odom": POSES[0], "/amcl_pose": POSES[1], "/tf": TF, "/tf_static": TF}
-    found = read(nav.REAL, wants(kinds))
+    types = {"/odom": POSES[0], "/amcl_pose": POSES[1], "/tf": TF, "/tf_static": TF_STATIC}
+    found = read(nav.REAL, {topic: tuple(one.fields.values()) for topic, one in types.items()})
     assert found.damage == ()
-    tables = {topic: Table.of(found.series[topic], kind) for topic, kind in kinds.items()}
+    columns = {topic: Columns.of(found.series[topic], one) for topic, one in types.items()}
     links = {
-        topic: links_of(
-            {TF.fields[name]: tables[topic].columns[name] for name in TF.fields}, tables[topic].owner_counts
-        )
+        topic: links_of({TF.fields[name]: columns[topic][name] for name in TF.fields}, columns[topic].owner_counts)
         for topic in ("/tf", "/tf_static")
     }
-    clock = Clock(tables["/odom"].stamped())
-    setting = Setting("real", clock, TransformTree(links["/tf_static"], links["/tf"]), "map")
-    poses = poses_of(tables["/odom"], setting)
+    clock = Clock(columns["/odom"].stamped())
+    context = Context("real", clock, TransformTree(links["/tf_static"], links["/tf"]), "map")
+    poses = poses_of(columns["/odom"], context)
     assert clock.simulated
-    assert (clock.notes, setting.notes, setting.lost) == ([], [], [])
+    assert (clock.notes, context.notes, context.lost) == ([], [], [])
     assert len(poses.t_ns) == 2639
     assert poses.base == "base_link"
-    amcl = tables["/amcl_pose"]
-    begin, times = int(poses.t_ns[0]), amcl.columns["stamp"]
+    amcl = columns["/amcl_pose"]
+    begin, times = int(poses.t_ns[0]), amcl["stamp"]
     both = (times >= begin) & (times <= poses.t_ns[-1])
     # the first pose was said, and latched, before the recording began
     assert (both.sum(), len(both)) == (134, 135)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.published import pickled
-from navirl_cli.published.numbers import unpacked
+from navirl_cli.published.fields import unpacked
 from navirl_cli.published.pickled import NAMES, Kept, Name, read_pickle
 
 NO_PICKLE = (

@@ -18,20 +18,6 @@ CROSSING = (Rule.CROSSED, Rule.CHAIN)
 APART = {Rule.CROSSED: 1, Rule.CHAIN: 0}
 
 
-def smooth_curve(seed, poses=120):
-    """A curve about 4 m long whose heading wanders, with uneven distances between the poses."""
-    rng = np.random.default_rng(seed)
-    heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.07, poses))
-    stride = rng.uniform(0.005, 0.06, poses)
-    return rng.uniform(-1, 1, 2) + np.cumsum(stride[:, None] * np.stack([np.cos(heading), np.sin(heading)], 1), axis=0)
-
-
-def shaken(seed):
-    """A curve seen by poses with 1 cm of noise: now and then backwards, and to and fro over borders of cells."""
-    line = smooth_curve(seed)
-    return line + np.random.default_rng(seed).normal(0, 0.01, line.shape)
-
-
 def twin(line, grid, rule):
     """The path of the naive rule."""
     in_cells = (line - np.array(grid.origin_m)) / grid.resolution_m
@@ -51,14 +37,14 @@ def check(path, line, grid):
 
 @pytest.mark.parametrize("seed", range(25))
 def test_smooth_curves_against_the_naive_rule(seed):
-    line = smooth_curve(seed)
+    line = make.smooth_curve(seed)
     path = rasterize(line, GRID)
     check(path, line, GRID)
     assert [tuple(cell) for cell in path.tolist()] == twin(line, GRID, Rule.STUDY)
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("curve", [smooth_curve, shaken])
+@pytest.mark.parametrize("curve", [make.smooth_curve, make.shaken])
 @pytest.mark.parametrize("rule", CROSSING)
 def test_what_the_line_crosses_against_exact_fractions(seed, curve, rule):
     line = curve(seed)
@@ -88,7 +74,7 @@ def test_any_line_becomes_a_path_without_spare_cells_that_it_crosses(rule, line)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_path_moves_with_its_line_by_whole_cells(rule, seed):
     # Binary fractions, so that nothing is rounded.
-    line = np.round(shaken(seed) * 1024) / 1024
+    line = np.round(make.shaken(seed) * 1024) / 1024
     grid = Grid(np.zeros((64, 64), dtype=bool), 0.125, (-4.0, -4.0))
     moved = rasterize(line + np.array([5, -3]) * 0.125, grid, rule)
     assert moved.tolist() == (rasterize(line, grid, rule) + np.array([5, -3])).tolist()
@@ -99,7 +85,7 @@ def test_a_path_moves_with_its_line_by_whole_cells(rule, seed):
 def test_a_path_turns_and_mirrors_with_its_line(rule, seed):
     # About the centre of the grid, which is a corner of cells: cell c becomes cell -1 - c.
     grid = Grid(np.zeros((64, 64), dtype=bool), 0.1, (0.0, 0.0))
-    line = shaken(seed)
+    line = make.shaken(seed)
     x, y = rasterize(line, grid, rule).T
     turned = rasterize(np.stack([-line[:, 1], line[:, 0]], axis=1), grid, rule)
     assert turned.tolist() == np.stack([-1 - y, x], axis=1).tolist()
@@ -110,7 +96,7 @@ def test_a_path_turns_and_mirrors_with_its_line(rule, seed):
 @pytest.mark.parametrize("rule", CROSSING)
 @pytest.mark.parametrize("seed", range(5))
 def test_what_is_crossed_does_not_know_the_direction(rule, seed):
-    line = shaken(seed)
+    line = make.shaken(seed)
     assert rasterize(line[::-1], GRID, rule).tolist() == rasterize(line, GRID, rule)[::-1].tolist()
 
 
@@ -186,7 +172,7 @@ def test_an_axis_and_a_diagonal(rule):
 
 @pytest.mark.parametrize("rule", Rule)
 def test_poses_standing_still_change_nothing(rule):
-    line = smooth_curve(3)
+    line = make.smooth_curve(3)
     assert rasterize(np.repeat(line, 4, axis=0), GRID, rule).tolist() == rasterize(line, GRID, rule).tolist()
 
 

@@ -4,12 +4,13 @@ import factories as make
 import numpy as np
 import oracles
 import pytest
-from test_rasterize import GRID, shaken, smooth_curve
 
 from navirl_cli.demos.demonstration import Contact
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.timing import PIECE, cell_times_s, steps_in_contact
 from navirl_cli.errors import DemonstrationError
+
+GRID = make.open_grid(60, 60, (-3.0, -2.95))
 
 
 def at(line, t_s, times):
@@ -19,7 +20,7 @@ def at(line, t_s, times):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("rule", Rule)
-@pytest.mark.parametrize("curve", [smooth_curve, shaken])
+@pytest.mark.parametrize("curve", [make.smooth_curve, make.shaken])
 def test_times_against_the_naive_twin(seed, rule, curve):
     line = curve(seed)
     t_s = np.cumsum(np.random.default_rng(seed).uniform(0.01, 0.1, len(line)))
@@ -34,7 +35,7 @@ def test_times_against_the_naive_twin(seed, rule, curve):
 
 @pytest.mark.parametrize("rule", Rule)
 def test_on_a_smooth_curve_each_time_is_that_of_the_nearest_point(rule):
-    line = smooth_curve(7)
+    line = make.smooth_curve(7)
     t_s = np.linspace(0, 10, len(line))
     cells = rasterize(line, GRID, rule)
     times = cell_times_s(line, t_s, cells, GRID)

@@ -7,7 +7,7 @@ import pytest
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import scan
-from navirl_cli.logs.roles.topics import Topic, choices, refusal, topics_of
+from navirl_cli.logs.roles.topics import Topic, choose, refusal, topics_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -63,7 +63,7 @@ def pick(tmp_path):
         log = nav.Log()
         log.messages = [nav.Message(topic, typename, 1, b"") for topic, typename in topics.items()]
         path = log.write(tmp_path / "run.mcap")
-        return choices("run.mcap", topics_of([scan(path)]), {role: (wish,) for role, wish in chosen.items()})
+        return choose("run.mcap", topics_of([scan(path)]), {role: (wish,) for role, wish in chosen.items()})
 
     return picked
 
@@ -201,11 +201,11 @@ def test_equal_candidates_are_the_users_choice(pick, topics, role, types):
         ),
         (
             {"tf": ("/odom",)},
-            "run.mcap: --topic tf=/odom: expected tf2_msgs/TFMessage, but it holds nav_msgs/Odometry",
+            "run.mcap: --topic tf=/odom: expected tf2_msgs/TFMessage, found nav_msgs/Odometry",
         ),
         (
             {"map": ("/maps",)},
-            "run.mcap: --topic map=/maps: expected nav_msgs/OccupancyGrid, but there is no such topic",
+            "run.mcap: --topic map=/maps: expected nav_msgs/OccupancyGrid, found no such topic",
         ),
         (
             {"map": ("/map", "/local_costmap/costmap")},
@@ -218,7 +218,7 @@ def test_choices_that_do_not_fit(tmp_path, chosen, message):
     log.messages = [nav.Message(topic, typename, 1, b"") for topic, typename in NAV2.items()]
     topics = topics_of([scan(log.write(tmp_path / "run.mcap"))])
     with pytest.raises(LogError) as caught:
-        choices("run.mcap", topics, chosen)
+        choose("run.mcap", topics, chosen)
     assert str(caught.value) == message
 
 
@@ -226,7 +226,7 @@ def test_what_is_named_twice_is_meant_once(tmp_path):
     log = nav.Log()
     log.messages = [nav.Message(topic, POSES, 1, b"") for topic in ("/left", "/right")]
     topics = topics_of([scan(log.write(tmp_path / "run.mcap"))])
-    found = choices("run.mcap", topics, {"people": ("/right", "/left", "/right")})
+    found = choose("run.mcap", topics, {"people": ("/right", "/left", "/right")})
     assert named(found, "people") == ["/right", "/left"]
 
 
@@ -247,9 +247,9 @@ def test_a_topic_without_messages_is_told(pick, tmp_path):
 def test_a_topic_that_is_only_announced_does_not_count():
     silent = Topic("/wrench", WRENCH, 0)
     both = {"/wrench": silent, "/ft": Topic("/ft", WRENCH, 3)}
-    assert named(choices("run.mcap", both, {}), "wrench") == ["/ft"]
-    alone = choices("run.mcap", {"/wrench": silent}, {})["wrench"]
-    assert "; /wrench is there without messages; record" in alone.problem
+    assert named(choose("run.mcap", both, {}), "wrench") == ["/ft"]
+    alone = choose("run.mcap", {"/wrench": silent}, {})["wrench"]
+    assert "; /wrench has no messages; record" in alone.problem
 
 
 def test_the_type_of_most_messages_counts(tmp_path):

@@ -1,8 +1,9 @@
-"""What is in a recording, told in a moment: from indexes, and from the first messages where only they tell."""
+"""What is in a recording, found quickly: from indexes, and from the first messages where indexes do not suffice."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -17,34 +18,40 @@ from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
-from navirl_cli.logs.roles.topics import Choice, Topic, choices, is_missed, topics_of
+from navirl_cli.logs.roles.topics import Choice, Topic, choose, is_missing, topics_of
 from navirl_cli.logs.sources import Source
 from navirl_cli.logs.tf.transforms import Link, links_of
 from navirl_cli.logs.tf.tree import TransformTree
 
-#: A topic that comes at least this often is silent where it pauses this many times longer than usual, and this long.
-_REGULAR_S, _PAUSE, _SILENT_S = 1.0, 5.0, 0.5
+#: A topic with messages at least this often is regular, s. It has a gap where it pauses this many times longer than
+#: usual, and for at least this long, s.
+_REGULAR_S, _PAUSE, _GAP_S = 1.0, 5.0, 0.5
 #: Roles whose stamps can be the recording's clock, the best first.
-_CLOCKS = ("odometry", "wrench", "tf")
+_CLOCKS: Final = ("odometry", "wrench", "tf")
+#: Chunks in whose messages stamps are looked for.
+_SAMPLED: Final = 8
+_STAMP: Final = "header.stamp"
+_TF_STAMP: Final = message_types.TF.fields[_STAMP]
+_TRANSFORMS: Final = message_types.TF.sequence or ""
 
 
 @dataclass(frozen=True)
 class Flow:
-    """How the messages of a topic come in."""
+    """When the messages of a topic came in."""
 
     topic: Topic
-    #: "cdr", "ros1", "json" or what the recorder says.
+    #: "cdr", "ros1", "json" or what the recorder wrote.
     encoding: str
     #: First and last time of receipt, ns; None without messages.
     start_ns: int | None
     end_ns: int | None
-    #: Messages a second on average, silences apart; None for less than three.
+    #: Messages a second on average, without gaps; None for less than three messages.
     rate_hz: float | None
-    #: Silences of a regular topic: how many, the longest in s, and when that begins, s since the log's first message.
+    #: Gaps of a regular topic: how many, the longest in s, and when that begins, s after the log's first message.
     gaps: int
     longest_s: float
     longest_at_s: float
-    #: Stamps less times of receipt, s, by the first messages; None without stamps.
+    #: Stamps - times of receipt, s, in the first messages; None without stamps.
     offset_s: float | None
 
 
@@ -54,176 +61,141 @@ class Overview:
 
     source: Source
     contents: tuple[Contents, ...]
+    #: First and last time of receipt, ns; None without messages.
     start_ns: int | None
     end_ns: int | None
     flows: tuple[Flow, ...]
     choices: dict[str, Choice]
-    #: What is lost, and what is odd about clocks, in words.
+    #: What is lost, and what is unusual about clocks, in words.
     damage: tuple[str, ...]
     clocks: tuple[str, ...]
-    #: How the frames of the first transforms connect; empty without tf.
+    #: How the frames of the first transforms connect, "map -> odom -> base_link"; empty without tf.
     frames: str
 
     @property
     def reference_s(self) -> float:
-        """Stamps less times of receipt of the topic whose clock counts, s; 0 where none is known."""
+        """Stamps - times of receipt of the topic whose clock counts, s; 0 where none is known."""
         names = [topic.name for role in _CLOCKS for topic in self.choices[role].topics]
         offsets = [flow.offset_s for name in names for flow in self.flows if flow.topic.name == name]
         return next((offset for offset in offsets if offset is not None), 0.0)
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """What extract cannot do without and the log does not hold."""
-        return tuple(role for role, choice in self.choices.items() if is_missed(choice, self.choices))
+        """The roles that extract needs and the log does not serve."""
+        return tuple(role for role, choice in self.choices.items() if is_missing(choice, self.choices))
 
 
 def overview(
-    source: Source, chosen: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
+    source: Source, requested: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
 ) -> Overview:
-    """Look over a recording.
+    """What is in a recording.
 
     Args:
         source: Its files.
-        chosen: Topics by role where the user says so.
+        requested: Names of topics by role, where the user named some.
         check: Read every message, so that damage inside of chunks shows too.
         progress: Called with bytes done and bytes in all.
 
     Raises:
-        LogError: A file is no MCAP file, or a chosen topic does not fit.
+        LogError: A file is no MCAP file, or a requested topic does not fit.
     """
     with ExitStack() as stack:
         files = [stack.enter_context(open_log(path)) for path in source.files]
-        return _looked_over(source, files, chosen, progress, check=check)
-
-
-def _looked_over(
-    source: Source,
-    files: Sequence[RawFile],
-    chosen: Mapping[str, Sequence[str]],
-    progress: Progress | None,
-    *,
-    check: bool,
-) -> Overview:
-    """The overview of files that are open."""
-    looked = [message_times(file) for file in files]
-    contents = tuple(one for one, _ in looked)
-    topics = topics_of(contents)
-    times: dict[str, list[IntArray]] = {}
-    for one, by_channel in looked:
-        for channel in one.channels:
-            times.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+        timed = [message_times(file) for file in files]
+        contents = tuple(one for one, _ in timed)
+        choices = choose(source.name, topics_of(contents), requested)
+        stamped, frames = _first_messages(files)
+        damage = _all_damage(files, progress) if check else [note for one in contents for note in one.damage]
     starts = [one.start_ns for one in contents if one.start_ns is not None]
     ends = [one.end_ns for one in contents if one.end_ns is not None]
-    start = min(starts, default=None)
-    sample = _first_messages(files)
-    encodings = {channel.topic: channel.message_encoding for one in contents for channel in one.channels}
-    flows = tuple(
-        _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start or 0, sample.stamped.get(name))
-        for name, topic in topics.items()
-    )
-    picked = choices(source.name, topics, chosen)
-    inside = _checked(files, progress) if check else [note for one in contents for note in one.damage]
     return Overview(
         source,
         contents,
-        start,
+        min(starts, default=None),
         max(ends, default=None),
-        flows,
-        picked,
-        tuple(map(str, (*source.damage, *inside))),
-        tuple(_clocks(picked, sample.stamped)),
-        sample.frames,
+        _flows(timed, min(starts, default=0), stamped),
+        choices,
+        tuple(map(str, (*source.damage, *damage))),
+        tuple(_clocks(choices, stamped)),
+        frames,
+    )
+
+
+def _flows(
+    timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], start_ns: int, stamped: Mapping[str, Stamped]
+) -> tuple[Flow, ...]:
+    """When the messages of each topic came in, by the times of receipt of each file's channels."""
+    times: dict[str, list[IntArray]] = {}
+    encodings: dict[str, str] = {}
+    for one, by_channel in timed:
+        for channel in one.channels:
+            times.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+            encodings[channel.topic] = channel.message_encoding
+    return tuple(
+        _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start_ns, stamped.get(name))
+        for name, topic in topics_of(one for one, _ in timed).items()
     )
 
 
 def _flow(topic: Topic, encoding: str, t_ns: IntArray, start_ns: int, stamped: Stamped | None) -> Flow:
-    """How one topic's messages come in."""
-    gaps = np.diff(t_ns) / NS_PER_S
-    usual = float(np.median(gaps)) if len(gaps) > 1 else np.inf
-    pauses = np.flatnonzero(gaps > max(_PAUSE * usual, _SILENT_S)) if usual < _REGULAR_S else np.zeros(0, dtype=int)
-    spoken = np.delete(gaps, pauses)
-    longest = int(pauses[gaps[pauses].argmax()]) if len(pauses) else None
-    offset = None if stamped is None or stamped.stamp_ns is None else (stamped.stamp_ns - stamped.log_ns)
-    some = None if offset is None or stamped is None else offset[stamped.stamp_ns != 0]
+    """When the messages of a topic came in."""
+    apart_s = np.diff(t_ns) / NS_PER_S
+    usual_s = float(np.median(apart_s)) if len(apart_s) > 1 else np.inf
+    gaps = np.flatnonzero(apart_s > max(_PAUSE * usual_s, _GAP_S)) if usual_s < _REGULAR_S else np.zeros(0, dtype=int)
+    without = np.delete(apart_s, gaps)
+    longest = int(gaps[apart_s[gaps].argmax()]) if len(gaps) else None
     return Flow(
         topic,
         encoding,
         int(t_ns[0]) if len(t_ns) else None,
         int(t_ns[-1]) if len(t_ns) else None,
-        len(spoken) / float(spoken.sum()) if len(spoken) > 1 and spoken.any() else None,
-        len(pauses),
-        0.0 if longest is None else float(gaps[longest]),
+        len(without) / float(without.sum()) if len(without) > 1 and without.any() else None,
+        len(gaps),
+        0.0 if longest is None else float(apart_s[longest]),
         0.0 if longest is None else (int(t_ns[longest]) - start_ns) / NS_PER_S,
-        None if some is None or not len(some) else float(np.median(some) / NS_PER_S),
+        None if stamped is None else _offset_s(stamped),
     )
 
 
-def _checked(files: Sequence[RawFile], progress: Progress | None) -> list[Damage]:
-    """Damage that shows when every message is read."""
-    total = sum(file.size for file in files)
-    notes: list[Damage] = []
-    done = 0
-    for path in files:
-        with LogFile(path) as log:
-            for _ in log.results(lambda _: True, _count, threads_here()):
-                if progress is not None:
-                    progress(done + log.position, total)
-            notes += log.damage
-        done += path.size
-    return notes
+def _offset_s(stamped: Stamped) -> float | None:
+    """Stamps - times of receipt, s, without stamps of 0; None where no others are left."""
+    if stamped.stamp_ns is None or not stamped.stamp_ns.any():
+        return None
+    offset_ns = (stamped.stamp_ns - stamped.log_ns)[stamped.stamp_ns != 0]
+    return float(np.median(offset_ns) / NS_PER_S)
 
 
-def _count(batch: Batch) -> int:
-    return len(batch.starts)
-
-
-def _clocks(picked: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
-    """What is odd about the clocks of the topics that an extraction would take."""
-    names = {role: [topic.name for topic in choice.topics] for role, choice in picked.items() if choice.topics}
+def _clocks(choices: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
+    """What is unusual about the clocks of the topics that an extraction would take."""
+    names = {role: [topic.name for topic in choice.topics] for role, choice in choices.items() if choice.topics}
     reference = next((name for role in _CLOCKS for name in names.get(role, ())), "")
     if reference not in stamped:
         return []
     clock = Clock(stamped[reference])
-    said = []
-    began_s = (int(stamped[reference].log_ns[0]) + clock.offset_ns) / NS_PER_S
+    notes = []
     if clock.simulated:
-        said.append(
+        begins_s = (int(stamped[reference].log_ns[0]) + clock.offset_ns) / NS_PER_S
+        notes.append(
             f"header stamps are simulated time, or time since the computer's start: {reference} begins at "
-            f"{began_s:.2f} s"
+            f"{begins_s:.2f} s"
         )
     elif abs(clock.offset_ns) > APART_S * NS_PER_S:
-        differ = clock.offset_ns / NS_PER_S
-        said.append(f"header stamps of {reference} differ by {differ:+.3f} s from the recorder's clock")
-    if said:
-        said[0] += "; extract goes by the stamps, unless --time log"
+        differ_s = clock.offset_ns / NS_PER_S
+        notes.append(f"header stamps of {reference} differ by {differ_s:+.3f} s from the recorder's clock")
+    if notes:
+        notes[0] += "; extract goes by the stamps, unless --time log"
     for role in ("wrench", "people"):
         for name in names.get(role, ()):
             if name in stamped and name != reference:
                 clock.times(stamped[name])
-    return [*said, *(f"in the first messages: {note}" for note in clock.notes)]
+    return [*notes, *(f"in the first messages: {note}" for note in clock.notes)]
 
 
-#: Chunks in whose messages stamps are looked for.
-_SAMPLED = 8
-_STAMP = "header.stamp"
-_TF_STAMP = message_types.TF.fields[_STAMP]
+def _first_messages(files: Sequence[RawFile]) -> tuple[dict[str, Stamped], str]:
+    """What the messages of the first chunks of a recording show.
 
-
-@dataclass(frozen=True, eq=False)
-class _Sample:
-    """What the first messages tell."""
-
-    #: Stamps by topic; of transforms those of each message's first.
-    stamped: dict[str, Stamped]
-    #: How the frames connect, "map -> odom -> base_link"; empty without tf.
-    frames: str
-
-
-def _first_messages(files: Sequence[RawFile]) -> _Sample:
-    """Look at the messages of the first chunks.
-
-    Args:
-        files: Of the recording.
+    Returns:
+        Stamps by topic, of transforms those of each message's first; and how the frames connect, empty without tf.
     """
     decoders: dict[Channel, Decoder | None] = {}
     parts: dict[str, list[Part]] = {}
@@ -235,7 +207,7 @@ def _first_messages(files: Sequence[RawFile]) -> _Sample:
 
     with LogFile(files[0]) as log:
         for number, batch in enumerate(log.batches(wanted)):
-            # without a summary, channels become known on the way
+            # without a summary, channels become known as the file is read
             if number >= _SAMPLED * len(log.channels):
                 break
             decoder = decoders[batch.channel]
@@ -248,15 +220,15 @@ def _first_messages(files: Sequence[RawFile]) -> _Sample:
     for topic, some in parts.items():
         if _TF_STAMP in some[0].columns:
             (static if topic.endswith("tf_static") else moving).extend(
-                link for part in some for link in links_of(part.columns, part.counts[message_types.TF.sequence or ""])
+                link for part in some for link in links_of(part.columns, part.counts[_TRANSFORMS])
             )
     stamped = {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
-    return _Sample(stamped, TransformTree(static, moving).describe() if static or moving else "")
+    return stamped, TransformTree(static, moving).describe() if static or moving else ""
 
 
 def _decoder(channel: Channel) -> Decoder | None:
     """A decoder of a channel's stamps, or of all of its transforms; None where it has none or cannot be decoded."""
-    tf = full_name(channel.schema_name) == message_types.TF.type_name
+    tf = full_name(channel.schema_name) == message_types.TF.name
     paths = tuple(message_types.TF.fields.values()) if tf else (_STAMP,)
     try:
         schema = parse_definition(
@@ -276,10 +248,29 @@ def _stamped(topic: str, parts: Sequence[Part]) -> Stamped | None:
             logs.append(part.log_time_ns)
             stamps.append(part.columns[_STAMP])
         else:
-            counts = part.counts[message_types.TF.sequence or ""]
+            counts = part.counts[_TRANSFORMS]
             some = counts > 0
             logs.append(part.log_time_ns[some])
             stamps.append(part.columns[_TF_STAMP][(np.cumsum(counts) - counts)[some]])
     log_ns, stamp_ns = np.concatenate(logs), np.concatenate(stamps)
     rows = np.argsort(log_ns, kind="stable")
     return Stamped(topic, log_ns[rows], stamp_ns[rows]) if rows.size else None
+
+
+def _all_damage(files: Sequence[RawFile], progress: Progress | None) -> list[Damage]:
+    """Damage that shows when every message is read."""
+    total = sum(file.size for file in files)
+    notes: list[Damage] = []
+    done = 0
+    for path in files:
+        with LogFile(path) as log:
+            for _ in log.results(lambda _: True, _count, threads_here()):
+                if progress is not None:
+                    progress(done + log.position, total)
+            notes += log.damage
+        done += path.size
+    return notes
+
+
+def _count(batch: Batch) -> int:
+    return len(batch.starts)

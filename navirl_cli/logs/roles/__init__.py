@@ -1,1 +1,1 @@
-"""Which topic is what, and what its columns mean: clocks, poses, people, maps, session."""
+"""Which topic is what, and what its columns mean: clocks, poses, wrench, people, commands, maps, session."""

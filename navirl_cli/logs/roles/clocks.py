@@ -181,14 +181,17 @@ class Clock:
         self.notes.append(f"{count} messages on {one.topic} {what}; the time of their receipt stands in")
 
 
-def in_order(topic: str, times_ns: IntArray, notes: list[str]) -> IntArray:
-    """Rows in order of time, of equal times the first; what was out of order or twice is noted.
+def in_order(topic: str, times_ns: IntArray) -> tuple[IntArray, list[str]]:
+    """Rows in order of time, of equal times the first.
 
     Args:
         topic: Its name, for notes.
         times_ns: (n,) ns in order of receipt.
-        notes: Where notes go.
+
+    Returns:
+        (m,) rows, and notes on what was out of order or came twice.
     """
+    notes = []
     _, rows = np.unique(times_ns, return_index=True)
     late = int((np.diff(times_ns) < 0).sum())
     twice = len(times_ns) - len(rows)
@@ -196,7 +199,7 @@ def in_order(topic: str, times_ns: IntArray, notes: list[str]) -> IntArray:
         notes.append(f"{late} messages on {topic} were received out of order; sorted by time")
     if twice:
         notes.append(f"{twice} messages on {topic} repeat the time of another; the first counts")
-    return rows
+    return rows, notes
 
 
 def _seconds(ns: IntArray) -> FloatArray:

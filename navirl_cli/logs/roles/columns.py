@@ -1,6 +1,6 @@
-"""A role's messages by the names that navirl uses, whatever their type."""
+"""The messages of one topic as columns, by the names that navirl uses whatever the message type is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,78 +10,89 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.logs.messages.series import Series
 from navirl_cli.logs.roles.clocks import Clock, Stamped
-from navirl_cli.logs.roles.message_types import Kind
+from navirl_cli.logs.roles.message_types import MessageType
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Columns:
     """The messages of one topic."""
 
     topic: str
-    kind: Kind
+    message_type: MessageType
     #: (n,) ns of receipt, ascending.
     log_time_ns: IntArray
-    #: By the kind's field: (n,) for fields of messages, (total,) for fields of entries.
-    columns: Mapping[str, NDArray[Any]]
-    #: (n,) entries of each message; None for a kind without entries.
+    #: By field of the role: (n,) for fields of messages, (total,) for fields of entries.
+    by_field: Mapping[str, NDArray[Any]]
+    #: (n,) entries of each message; None for a type without entries.
     counts: IntArray | None
 
     def __len__(self) -> int:
         return len(self.log_time_ns)
 
+    def __contains__(self, name: str) -> bool:
+        return name in self.by_field
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.by_field[name]
+
     @staticmethod
-    def of(series: Series, kind: Kind) -> "Table":
-        """A topic that was read with the fields of a kind."""
-        columns = {name: series.columns[path] for name, path in kind.fields.items()}
-        counts = None if kind.sequence is None else series.counts[kind.sequence]
-        return Table(series.topic, kind, series.log_time_ns, columns, counts)
+    def of(series: Series, message_type: MessageType) -> "Columns":
+        """The columns of a topic that was read with the fields of a message type."""
+        by_field = {name: series.columns[path] for name, path in message_type.fields.items()}
+        counts = None if message_type.sequence is None else series.counts[message_type.sequence]
+        return Columns(series.topic, message_type, series.log_time_ns, by_field, counts)
 
     @property
     def owner_counts(self) -> IntArray:
-        """(n,) entries of each message: one of a kind without."""
+        """(n,) entries of each message: one where the type has no entries."""
         return np.ones(len(self), dtype=np.int64) if self.counts is None else self.counts
 
     @property
     def owner(self) -> IntArray:
-        """(total,) the message that each entry stands in."""
+        """(total,) row of the message that each entry belongs to."""
         return np.repeat(np.arange(len(self)), self.owner_counts)
 
     def stacked(self, *names: str) -> FloatArray:
         """(n, k) numbers of several columns side by side."""
-        return np.stack([self.columns[name].astype(np.float64) for name in names], axis=1)
+        return np.stack([self[name].astype(np.float64) for name in names], axis=1)
 
     def frames(self) -> NDArray[np.object_]:
-        """Names of frames without leading slashes, of each entry or, where a kind has none, of each message."""
-        frames = self.columns.get("frame")
-        if frames is None:
+        """(total,) names of frames without leading slashes; of types without entries (n,)."""
+        if "frame" not in self:
             return np.full(len(self.owner), "", dtype=object)
-        if self.counts is not None and not self.kind.of_entries("frame"):
+        frames = self["frame"]
+        if self.counts is not None and not self.message_type.of_entries("frame"):
             frames = frames[self.owner]
         plain = {frame: frame.lstrip("/") for frame in set(frames.tolist())}
         return np.array([plain[frame] for frame in frames.tolist()], dtype=object)
 
-    def rows(self, kept: NDArray[Any]) -> "Table":
-        """The messages of some rows; for kinds without entries."""
-        columns = {name: column[kept] for name, column in self.columns.items()}
-        return Table(self.topic, self.kind, self.log_time_ns[kept], columns, None)
+    def rows(self, kept: NDArray[Any]) -> "Columns":
+        """Some of the messages, of a type without entries."""
+        by_field = {name: column[kept] for name, column in self.by_field.items()}
+        return Columns(self.topic, self.message_type, self.log_time_ns[kept], by_field, None)
+
+    def last_entries(self) -> "Columns":
+        """The last entry of each message that has some, as messages without entries."""
+        counts = self.owner_counts
+        some = counts > 0
+        last = np.cumsum(counts)[some] - 1
+        by_field = {
+            name: column[last if self.message_type.of_entries(name) else some] for name, column in self.by_field.items()
+        }
+        return Columns(self.topic, self.message_type, self.log_time_ns[some], by_field, None)
 
     def stamped(self, *, momentary: bool = False) -> Stamped:
-        """The messages' stamps: of messages whose entries have their own, the latest, since some may have none."""
-        stamps = self.columns.get("stamp")
-        if stamps is not None and self.kind.of_entries("stamp"):
-            counts = self.owner_counts
-            first = np.cumsum(counts) - counts
-            whole = np.zeros(len(self), dtype=np.int64)
+        """The messages' stamps; of entries with their own stamps the latest, since some may have none."""
+        stamps = self.by_field.get("stamp")
+        if stamps is not None and self.counts is not None and self.message_type.of_entries("stamp"):
+            latest = np.zeros(len(self), dtype=np.int64)
             if len(stamps):
-                whole[counts > 0] = np.maximum.reduceat(stamps, first[counts > 0])
-            stamps = whole
+                first = np.cumsum(self.counts) - self.counts
+                some = self.counts > 0
+                latest[some] = np.maximum.reduceat(stamps, first[some])
+            stamps = latest
         return Stamped(self.topic, self.log_time_ns, stamps, momentary)
 
     def times(self, clock: Clock, *, momentary: bool = False) -> IntArray:
         """(n,) ns on the recording's clock."""
         return clock.times(self.stamped(momentary=momentary))
-
-
-def wants(kinds_by_topic: Mapping[str, Kind]) -> dict[str, Sequence[str]]:
-    """What to read of topics, by their kinds."""
-    return {topic: tuple(kind.fields.values()) for topic, kind in kinds_by_topic.items()}

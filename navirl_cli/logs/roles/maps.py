@@ -6,18 +6,18 @@ import numpy as np
 
 from navirl_cli.errors import FrameError, LogError
 from navirl_cli.logs.recording import Occupancy
-from navirl_cli.logs.roles.columns import Table
-from navirl_cli.logs.roles.context import Setting
+from navirl_cli.logs.roles.columns import Columns
+from navirl_cli.logs.roles.context import Context
 
 
-def map_in(log: str, tables: Sequence[Table]) -> tuple[Occupancy, str]:
+def map_in(log: str, topics: Sequence[Columns]) -> tuple[Occupancy, str]:
     """The last map of a log, and its frame.
 
     Raises:
         LogError: Its cells do not run along its frame's axes, or its numbers contradict each other.
     """
-    (table,) = tables
-    last = {name: column[-1] for name, column in table.columns.items() if name != "data"}
+    (columns,) = topics
+    last = {name: column[-1] for name, column in columns.by_field.items() if name != "data"}
     yaw = float(2 * np.arctan2(last["qz"], last["qw"]))
     if abs(np.sin(yaw / 2)) > 1e-6:
         raise LogError(
@@ -31,39 +31,39 @@ def map_in(log: str, tables: Sequence[Table]) -> tuple[Occupancy, str]:
             f"{log}: expected a map with a positive resolution and a finite origin, found {found}; record the map "
             "anew, or give it with --map"
         )
-    height, width, size = int(last["height"]), int(last["width"]), int(table.owner_counts[-1])
+    height, width, size = int(last["height"]), int(last["width"]), int(columns.owner_counts[-1])
     if size != height * width or size == 0:
         raise LogError(f"{log}: expected a map of {height} x {width} cells, found {size}; record the map anew")
-    data = table.columns["data"][-size:].astype(np.int8)
+    data = columns["data"][-size:].astype(np.int8)
     # A float32 of 0.1 is 0.10000000149 as a double: the shortest decimal is what was meant.
     resolution = float(str(np.float32(last["resolution"])))
     return Occupancy(data.reshape(height, width), resolution, origin), str(last["frame"])
 
 
-def occupancy_of(drawn: tuple[Occupancy, str], setting: Setting) -> Occupancy:
+def occupancy_of(map_and_frame: tuple[Occupancy, str], context: Context) -> Occupancy:
     """A map brought into the fixed frame, which must not be turned against the map's.
 
     Args:
-        drawn: The map and its frame; "" for one that is in the fixed frame.
-        setting: Clock and frames.
+        map_and_frame: The map and its frame; "" for one that is in the fixed frame.
+        context: Clock and frames.
 
     Raises:
         LogError: The fixed frame is turned against the map's, or moves.
         FrameError: tf does not connect the frames.
     """
-    occupancy, frame = drawn
-    if not frame or setting.same(frame):
+    occupancy, frame = map_and_frame
+    if not frame or context.is_fixed(frame):
         return occupancy
     try:
-        span = setting.tree.span(setting.fixed, frame)
-        into = setting.tree.lookup(setting.fixed, frame, np.zeros(1, dtype=np.int64) if span is None else span)
+        span = context.tree.span(context.fixed, frame)
+        into = context.tree.lookup(context.fixed, frame, np.zeros(1, dtype=np.int64) if span is None else span)
     except FrameError as error:
-        raise FrameError(f"{setting.log}: the map is given in frame {frame!r}: {error}") from error
+        raise FrameError(f"{context.log}: the map is given in frame {frame!r}: {error}") from error
     moved, yaw = into.translation_m[:, :2], into.yaw_rad
     if np.abs(yaw).max() > 1e-3 or np.abs(moved - moved[0]).max() > occupancy.resolution_m / 10:
         raise LogError(
-            f"{setting.log}: the map's frame {frame!r} is turned against {setting.fixed!r} or moves in it, so that its "
-            f"cells cannot be kept; choose --frame {frame}, or give a map in {setting.fixed!r} with --map"
+            f"{context.log}: the map's frame {frame!r} is turned against {context.fixed!r} or moves in it, so that its "
+            f"cells cannot be kept; choose --frame {frame}, or give a map in {context.fixed!r} with --map"
         )
     x, y = occupancy.origin_m
     return Occupancy(occupancy.data, occupancy.resolution_m, (x + float(moved[0, 0]), y + float(moved[0, 1])))

@@ -1,4 +1,4 @@
-"""Numbers that no sensor gave: not finite, or bent by a flipped bit."""
+"""Which measurements are plausible: finite, possible for the quantity, and not changed by a flipped bit."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,106 +7,84 @@ import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray
 
-#: Measurements judged at once, so that the memory holds no copies of a whole log.
+#: Measurements judged at once: memory never holds a copy of all of them.
 _BLOCK: Final = 1 << 15
 #: A number this small between two that are not comes from a flipped exponent.
 _TINY, _ORDINARY = 1e-30, 1e-12
-#: A rotation's quaternion is as long as 1, but for rounding.
-_QUATERNION: Final = (0.9, 1.1)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What values a quantity can have."""
+    """The values that a quantity can have."""
 
-    #: Larger ones are absurd.
+    #: Larger ones are impossible.
     largest: float
-    #: A single value this far from both its neighbours, which agree to a tenth of it, is absurd.
+    #: A single value this far from both its neighbours, which agree to a tenth of it, is impossible.
     spike: float
     unit: str
 
 
-#: No robot carries such forces, nor does a hand jerk like that within one sample.
+#: No robot carries larger forces, and no hand changes them by more within one sample.
 FORCES: Final = Limits(1e5, 500.0, "N")
 #: Maps are smaller; no robot is elsewhere for one message and back.
 PLACES: Final = Limits(1e6, 1.0, "m")
 
 
-def sound(values: FloatArray, limits: Limits) -> BoolArray:
-    """Say which measurements can be true.
+def plausible_messages(
+    topic: str, values: FloatArray, limits: Limits, rotations: BoolArray | None = None
+) -> tuple[BoolArray, str]:
+    """Which messages of a topic are plausible, and what is wrong with the others.
 
     Args:
+        topic: Its name.
         values: (n, k) in order of time.
         limits: Of the quantity.
+        rotations: (n,) whether a message's quaternion is a rotation; None for messages without rotations.
 
     Returns:
-        (n,) False where one of the k is not finite, larger than possible, a lone spike, or the remains of a flipped
-        exponent: nearly 0 between neighbours that are not.
+        (n,) False where one of the k is not finite, larger than possible, a single spike, or the result of a flipped
+        exponent (nearly 0 between neighbours that are not), or where the rotation is none; and a sentence about those
+        messages, empty where all are plausible.
     """
-    good: BoolArray = np.array(~_wrong(values, limits).any(axis=1))
-    return good
+    impossible = _impossible(values, limits)
+    good: BoolArray = np.array(~impossible.any(axis=1))
+    finite = np.isfinite(values).all(axis=1)
+    found = {"not finite": ~finite}
+    if rotations is not None:
+        found["without a rotation"] = finite & ~rotations
+        good = good & rotations
+    absurd = finite & impossible.any(axis=1) & (rotations if rotations is not None else True)
+    if absurd.any():
+        numbers = values[absurd][impossible[absurd]]
+        example = numbers[np.abs(np.log10(np.maximum(np.abs(numbers), 1e-300))).argmax()]
+        found[f"impossible, such as {example:.3g} {limits.unit}"] = absurd
+    counts = [f"{int(rows.sum())} {what}" for what, rows in found.items() if rows.any()]
+    if good.all():
+        return good, ""
+    return (
+        good,
+        f"{int((~good).sum())} messages on {topic} hold implausible values ({', '.join(counts)}); left out",
+    )
 
 
-def _wrong(values: FloatArray, limits: Limits) -> BoolArray:
-    """(n, k) which numbers cannot be true, block by block with a neighbour at both ends."""
-    wrong: BoolArray = np.zeros(values.shape, dtype=np.bool_)
+def _impossible(values: FloatArray, limits: Limits) -> BoolArray:
+    """(n, k) which numbers are not plausible, block by block with a neighbour at both ends."""
+    impossible: BoolArray = np.zeros(values.shape, dtype=np.bool_)
     for start in range(0, len(values), _BLOCK):
         first, stop = max(start - 1, 0), min(start + _BLOCK, len(values))
-        wrong[start:stop] = _wrong_in(values[first : stop + 1], limits)[start - first : stop - first]
-    return wrong
+        impossible[start:stop] = _impossible_in(values[first : stop + 1], limits)[start - first : stop - first]
+    return impossible
 
 
-def _wrong_in(values: FloatArray, limits: Limits) -> BoolArray:
-    """(n, k) which numbers cannot be true."""
-    wrong: BoolArray = np.array(~(np.abs(values) <= limits.largest))
-    kept = np.flatnonzero(~wrong.any(axis=1))
+def _impossible_in(values: FloatArray, limits: Limits) -> BoolArray:
+    """(n, k) which numbers are not plausible."""
+    impossible: BoolArray = np.array(~(np.abs(values) <= limits.largest))
+    kept = np.flatnonzero(~impossible.any(axis=1))
     if kept.size >= 3:
         before, here, after = values[kept[:-2]], values[kept[1:-1]], values[kept[2:]]
         apart = np.minimum(np.abs(here - before), np.abs(here - after))
         spike = (apart > limits.spike) & (np.abs(after - before) < limits.spike / 10)
         size = np.abs(here)
         tiny = (size > 0) & (size < _TINY) & (np.minimum(np.abs(before), np.abs(after)) > _ORDINARY)
-        wrong[kept[1:-1]] = spike | tiny
-    return wrong
-
-
-def sound_rotations(quaternions: FloatArray) -> BoolArray:
-    """(n,) whether quaternions (n, 4) are rotations."""
-    # clipped, since the square of a damaged number may be too large for a float
-    squares = np.square(np.clip(quaternions, -2.0, 2.0)).sum(axis=1)
-    low, high = _QUATERNION
-    good: BoolArray = (squares > low**2) & (squares < high**2)
-    return good
-
-
-def describe(topic: str, values: FloatArray, limits: Limits, turned: BoolArray | None = None) -> tuple[BoolArray, str]:
-    """Say which messages of a topic can be true, and what is wrong with the others.
-
-    Args:
-        topic: Its name.
-        values: (n, k) in order of time.
-        limits: Of the quantity.
-        turned: (n,) whether a message's rotation is one; None for messages without.
-
-    Returns:
-        (n,) good messages, and a sentence, empty where all are good.
-    """
-    wrong = _wrong(values, limits)
-    good: BoolArray = np.array(~wrong.any(axis=1))
-    finite = np.isfinite(values).all(axis=1)
-    kinds = {"not finite": ~finite}
-    if turned is not None:
-        kinds["without a rotation"] = finite & ~turned
-        good = good & turned
-    absurd = finite & wrong.any(axis=1) & (turned if turned is not None else True)
-    if absurd.any():
-        numbers = values[absurd][wrong[absurd]]
-        strangest = numbers[np.abs(np.log10(np.maximum(np.abs(numbers), 1e-300))).argmax()]
-        kinds[f"absurd, such as {strangest:.3g} {limits.unit}"] = absurd
-    counts = [f"{int(rows.sum())} {kind}" for kind, rows in kinds.items() if rows.any()]
-    if good.all():
-        return good, ""
-    return (
-        good,
-        f"{int((~good).sum())} messages on {topic} hold numbers that cannot be true ({', '.join(counts)}); left out",
-    )
+        impossible[kept[1:-1]] = spike | tiny
+    return impossible

@@ -128,7 +128,7 @@ class Curve:
         t_ns = np.concatenate([np.asarray(link.t_ns, dtype=np.int64) for link in links])
         translation = np.concatenate([np.asarray(link.translation_m, dtype=np.float64) for link in links])
         quaternion = np.concatenate([np.asarray(link.quaternion, dtype=np.float64) for link in links])
-        good = _sound(translation, quaternion) & (zeros | (t_ns != 0))
+        good = (np.abs(translation) < _FARTHEST_M).all(axis=1) & are_rotations(quaternion) & (zeros | (t_ns != 0))
         good &= parent not in ("", child) and child != ""
         rows = np.flatnonzero(good)
         if not rows.size:
@@ -280,13 +280,12 @@ def beyond(times: IntArray, span: Span, hold_ns: int = 0) -> BoolArray:
     return (times < span[0] - hold_ns) | (times > span[1] + hold_ns)
 
 
-def _sound(translation: FloatArray, quaternion: FloatArray) -> BoolArray:
-    """Which poses hold numbers that can be meant, shape (k,)."""
-    near = (np.abs(translation) < _FARTHEST_M).all(axis=1)
+def are_rotations(quaternion: FloatArray) -> BoolArray:
+    """Which quaternions of shape (k, 4) are rotations, shape (k,): those of length 1, but for rounded digits."""
     # clipped, since the square of a damaged number may be too large for a float
     length = np.linalg.norm(np.clip(quaternion, -2.0, 2.0), axis=1)
-    sound: BoolArray = near & (length > _LENGTHS[0]) & (length < _LENGTHS[1])
-    return sound
+    rotations: BoolArray = (length > _LENGTHS[0]) & (length < _LENGTHS[1])
+    return rotations
 
 
 def _chain(steps: Steps, times: IntArray) -> Transforms:
