@@ -60,9 +60,9 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
     (contact,) = d.contacts
     assert contact.start_s == pytest.approx(PUSH_S[0] - GOAL_S, abs=0.1)
     assert contact.end_s == pytest.approx(PUSH_S[1] - GOAL_S, abs=0.1)
-    assert contact.impulse_ns == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
+    assert contact.impulse_n_s == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
     assert contact.direction_rad == pytest.approx(np.pi / 2, abs=0.03)
-    assert contact.peak_n == pytest.approx(12.0, abs=1.0)
+    assert contact.peak_force_n == pytest.approx(12.0, abs=1.0)
     quiet = (d.t_s < 3) | (d.t_s > 6)
     assert np.abs(d.force_n[quiet].mean(axis=0)).max() < 0.05
 

@@ -27,8 +27,8 @@ LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 class Gain:
     """An estimate of k, in (m/s)/N."""
 
-    m_s_per_n: float
-    standard_error: float
+    gain_m_s_n: float
+    standard_error_m_s_n: float
     #: Number of pushes that it comes from.
     pushes: int
     #: Mean time by which the velocity follows the force, s.
@@ -98,11 +98,11 @@ def gain_of(
 
 def pooled(gains: Sequence[Gain]) -> Gain:
     """One gain from several recordings of one robot: their mean, weighted by the inverse of their variances."""
-    weight = np.array([1 / max(gain.standard_error, 1e-12) ** 2 for gain in gains])
+    weight = np.array([1 / max(gain.standard_error_m_s_n, 1e-12) ** 2 for gain in gains])
     weight /= weight.sum()
     return Gain(
-        float(weight @ [gain.m_s_per_n for gain in gains]),
-        float(np.sqrt(weight**2 @ [gain.standard_error**2 for gain in gains])),
+        float(weight @ [gain.gain_m_s_n for gain in gains]),
+        float(np.sqrt(weight**2 @ [gain.standard_error_m_s_n**2 for gain in gains])),
         sum(gain.pushes for gain in gains),
         float(weight @ [gain.delay_s for gain in gains]),
     )
