@@ -62,7 +62,7 @@ def test_demonstrations_come_back_as_they_were(demos):
             if field.name == "grid":
                 assert new.digest == old.digest
             elif field.name == "contacts":
-                assert [c.impulse_ns for c in new] == [pytest.approx(c.impulse_ns, abs=1e-6) for c in old]
+                assert [c.impulse_n_s for c in new] == [pytest.approx(c.impulse_n_s, abs=1e-6) for c in old]
             elif field.name == "tracks":
                 assert [track.name for track in new] == [track.name for track in old]
                 for track, was in zip(new, old, strict=True):

@@ -130,12 +130,12 @@ def test_a_sensor_that_turns_on_the_robot_feels_the_same_push(recording, tmp_pat
     assert turned.force_n == pytest.approx(fixed.force_n, abs=0.8)
     assert turned.base_n[:, 1].mean() == pytest.approx(12.0 * 2 / 14, abs=0.02)
     (contact,) = contacts_within(turned, START_NS, START_NS + 14 * 10**9)
-    assert contact.impulse_ns == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
+    assert contact.impulse_n_s == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
 
 
 def test_a_log_whose_sensor_drifts_holds_the_same_push(tmp_path):
     drifting = Run(lasts_s=150.0, drift_n_min=(2.0, -1.0, 3.0))
     pushes = pushes_of(load_recording(write_run(tmp_path / "run.mcap", drifting)), PushSettings())
     (contact,) = contacts_within(pushes, START_NS, START_NS + 150 * 10**9)
-    assert contact.impulse_ns == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
+    assert contact.impulse_n_s == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
     assert pushes.noise_n < 0.1

@@ -60,9 +60,9 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
     (contact,) = d.contacts
     assert contact.start_s == pytest.approx(PUSH_S[0] - GOAL_S, abs=0.1)
     assert contact.end_s == pytest.approx(PUSH_S[1] - GOAL_S, abs=0.1)
-    assert contact.impulse_ns == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
+    assert contact.impulse_n_s == pytest.approx(tuple(PUSH_N * 2.0), abs=0.6)
     assert contact.direction_rad == pytest.approx(np.pi / 2, abs=0.03)
-    assert contact.peak_n == pytest.approx(12.0, abs=1.0)
+    assert contact.peak_force_n == pytest.approx(12.0, abs=1.0)
     quiet = (d.t_s < 3) | (d.t_s > 6)
     assert np.abs(d.force_n[quiet].mean(axis=0)).max() < 0.05
 
@@ -71,7 +71,7 @@ def test_a_threshold_within_the_noise_is_told(make):
     settings = ExtractSettings(push=PushSettings(begins_n=0.2))
     (note,) = extract(make(), settings).notes
     assert note.startswith("run.mcap: without contact the force still shakes by 0.0")
-    assert "contacts from 0.2 N on may be noise; raise --contact-force to 0." in note
+    assert "contacts from 0.2 N on may be noise; raise `contact_force` to 0." in note
 
 
 def test_a_threshold_above_the_push_leaves_no_contact(make):
@@ -141,11 +141,11 @@ def test_goal_and_people_can_be_said(make):
     assert d.goal_m == (4.0, 0.0)
     assert d.people_m.tolist() == [[2.0, -1.0], [1.0, 1.0]]
     assert d.notes == ()
-    assert "no people in the scene; say where they stand with --person x,y" in one(make(people=None)).notes
+    assert "no people in the scene; say where they stand with `person` x,y" in one(make(people=None)).notes
 
 
 def test_without_goals_the_error_says_what_to_do(make):
-    with pytest.raises(DemonstrationError, match=r"no goal is announced.* --goal x,y, or choose --split stop"):
+    with pytest.raises(DemonstrationError, match=r"no goal is announced.* `goal` x,y, or choose `split` stop"):
         extract(make(goals=()), ExtractSettings())
 
 

@@ -53,8 +53,8 @@ def pushed():
 def test_a_robot_that_gives_way_and_nothing_else(recording, odometry):
     seconds = (recording.t_ns - recording.t_ns[0]) / 1e9
     gain = of(replace(recording, velocity_m_s=velocity_m_s(PUSHED, seconds) if odometry else None))
-    assert gain.m_s_per_n == pytest.approx(K, rel=0.01)
-    assert gain.standard_error < 0.01 * K
+    assert gain.gain_m_s_n == pytest.approx(K, rel=0.01)
+    assert gain.standard_error_m_s_n < 0.01 * K
     assert gain.pushes == 3
     assert gain.delay_s <= 0.02
 
@@ -62,7 +62,7 @@ def test_a_robot_that_gives_way_and_nothing_else(recording, odometry):
 def test_a_robot_that_turns_gives_way_to_its_own_left(recording):
     spun = replace(recording, yaw_rad=recording.yaw_rad + np.pi / 2, velocity_m_s=None)
     # What was ahead is to the right now: the base's left is the way back, along which nobody gives way.
-    assert abs(of(spun).m_s_per_n) < 0.2 * K
+    assert abs(of(spun).gain_m_s_n) < 0.2 * K
 
 
 @pytest.mark.parametrize(("delay_s", "lag_s"), [(0.0, 0.0), (0.2, 0.0), (0.0, 0.2), (0.1, 0.15)])
@@ -70,7 +70,7 @@ def test_a_late_answer_is_found_and_does_not_make_the_gain_small(recording, dela
     keep = np.exp(-0.01 / lag_s) if lag_s else 0.0
     late = lfilter([1 - keep], [1, -keep], np.append(np.zeros(round(delay_s * 100)), pushed()))[:1400]
     gain = of(sideways(recording, K * late))
-    assert gain.m_s_per_n == pytest.approx(K, rel=0.03)
+    assert gain.gain_m_s_n == pytest.approx(K, rel=0.03)
     assert gain.delay_s == pytest.approx(delay_s + lag_s, abs=0.03)
 
 
@@ -81,7 +81,7 @@ def test_a_navigation_that_pulls_back_does_not_make_the_gain_small(recording):
         velocity.append(K * newtons + float(np.clip(-0.5 * moved, -0.2, 0.2)))
         moved += 0.01 * velocity[-1]
     gain = of(sideways(recording, np.array(velocity)))
-    assert gain.m_s_per_n == pytest.approx(K, rel=0.03)
+    assert gain.gain_m_s_n == pytest.approx(K, rel=0.03)
     # The plain regression of the velocity on the force, which knows nothing of it, fails.
     assert np.dot(force, velocity) / np.dot(force, force) < 0.9 * K
 
@@ -95,7 +95,7 @@ def test_errors_are_as_large_as_they_are_said_to_be(recording):
         # A navigation that changes its mind over some 0.7 s.
         mind = lfilter([0.02], [1, -0.98], lfilter([0.02], [1, -0.98], rng.normal(0, 1.0, 1400)))
         gain = gain_of(sideways(recording, K * pushed() + mind), pushes, [d], 3.0)
-        misses.append((gain.m_s_per_n - K) / gain.standard_error)
+        misses.append((gain.gain_m_s_n - K) / gain.standard_error_m_s_n)
     # With three pushes an error is itself known to a third only, so that misses are wider than a normal distribution.
     assert abs(np.mean(misses)) < 0.5
     assert 0.7 < np.std(misses) < 1.8
@@ -106,8 +106,8 @@ def test_a_leap_of_the_localisation_is_left_out(recording):
     jump_ns = int(recording.t_ns[0]) + 10_200_000_000
     xy = recording.xy_m + np.outer(recording.t_ns >= jump_ns, [0.0, 0.3])
     leapt = replace(recording, xy_m=xy, velocity_m_s=None)
-    assert of(replace(leapt, jumps=(Jump(jump_ns, 0.3),))).m_s_per_n == pytest.approx(K, rel=0.02)
-    assert of(leapt).standard_error > 0.1 * K
+    assert of(replace(leapt, jumps=(Jump(jump_ns, 0.3),))).gain_m_s_n == pytest.approx(K, rel=0.02)
+    assert of(leapt).standard_error_m_s_n > 0.1 * K
 
 
 def test_rare_poses_suffice(recording):
@@ -119,7 +119,7 @@ def test_rare_poses_suffice(recording):
             yaw_rad=recording.yaw_rad[::every],
             velocity_m_s=None,
         )
-        assert of(rare).m_s_per_n == pytest.approx(K, rel=0.03), every
+        assert of(rare).gain_m_s_n == pytest.approx(K, rel=0.03), every
 
 
 @pytest.mark.parametrize("pushes", [(), ((5.0, 7.0, 14.0, 0.0),)], ids=["nobody", "forward"])
@@ -140,8 +140,8 @@ def test_joystick_trials_do_not_count(recording):
 
 def test_gains_of_one_robot_are_pooled_by_their_errors():
     both = pooled([Gain(0.010, 0.001, 3, 0.1), Gain(0.020, 0.002, 5, 0.2)])
-    assert both.m_s_per_n == pytest.approx((4 * 0.010 + 0.020) / 5)
-    assert both.standard_error == pytest.approx(1 / np.sqrt(1e6 + 0.25e6))
+    assert both.gain_m_s_n == pytest.approx((4 * 0.010 + 0.020) / 5)
+    assert both.standard_error_m_s_n == pytest.approx(1 / np.sqrt(1e6 + 0.25e6))
     assert (both.pushes, both.delay_s) == (8, pytest.approx(0.12))
 
 
@@ -150,13 +150,13 @@ def test_the_gain_of_the_simulated_robot_is_found_in_the_sample_logs():
     for log in sorted((ROOT / "sample_logs").glob("*.mcap")):
         assert any(true.force_n.any() for true in read_truth(log).trials)
         gain = of(load_recording(log))
-        assert abs(gain.m_s_per_n - GAIN_S_KG) < 2.5 * gain.standard_error, log
-        assert gain.standard_error < 0.06 * GAIN_S_KG
+        assert abs(gain.gain_m_s_n - GAIN_S_KG) < 2.5 * gain.standard_error_m_s_n, log
+        assert gain.standard_error_m_s_n < 0.06 * GAIN_S_KG
         assert gain.delay_s <= 0.05
         gains.append(gain)
     both = pooled(gains)
-    assert abs(both.m_s_per_n - GAIN_S_KG) < 2.5 * both.standard_error
-    assert both.standard_error < 0.02 * GAIN_S_KG
+    assert abs(both.gain_m_s_n - GAIN_S_KG) < 2.5 * both.standard_error_m_s_n
+    assert both.standard_error_m_s_n < 0.02 * GAIN_S_KG
 
 
 def test_extract_prints_and_writes_the_gain(navirl, tmp_path):

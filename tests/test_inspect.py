@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
+from navirl_cli.commands.usage import as_options
 from navirl_cli.logs.roles.topics import ROLES
 
 SAMPLES = Path(__file__).parent.parent / "sample_logs"
@@ -151,11 +152,11 @@ def test_what_extract_would_take_follows_the_users_choice(inspect, navirl, tmp_p
     assert view["roles"]["wrench"] == {
         "topics": [],
         "reason": None,
-        "problem": problem + "--topic wrench=/other_wrench",
+        "problem": problem + "`topic` wrench=/other_wrench",
     }
     assert problem in navirl("inspect", path).stdout
     (view,), _ = inspect(path, "--topic", "wrench=/other_wrench")
-    assert view["roles"]["wrench"] == {"topics": ["/other_wrench"], "reason": "named by --topic", "problem": None}
+    assert view["roles"]["wrench"] == {"topics": ["/other_wrench"], "reason": "named by `topic`", "problem": None}
     error = navirl("inspect", path, "--topic", "wrench=/odom", code=1).stderr
     assert error == (
         "navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, found "
@@ -171,10 +172,10 @@ def test_what_is_missing_is_told_with_what_supplies_it(inspect, navirl, tmp_path
     remedies = {
         "wrench": "record the force-torque sensor's topic",
         "odometry": "record the robot's odometry, usually /odom",
-        "map": "give the map's file with --map, or record it, usually /map",
-        "people": "say where they stand with --person x,y",
-        "goal": "say where it is with --goal x,y, or choose --split stop or --split none",
-        "joystick": "name the topic of velocities that a hand gave with --topic joystick=/name",
+        "map": "give the map's file with `map`, or record it, usually /map",
+        "people": "say where they stand with `person` x,y",
+        "goal": "say where it is with `goal` x,y, or choose `split` stop or `split` none",
+        "joystick": "name the topic of velocities that a hand gave with `topic` joystick=/name",
         "tf": "record /tf where poses or people are not in the map's frame",
         "tf_static": "record /tf_static where the sensor is not in the robot's frame",
     }
@@ -183,7 +184,7 @@ def test_what_is_missing_is_told_with_what_supplies_it(inspect, navirl, tmp_path
         assert view["roles"][role]["topics"] == []
         assert view["roles"][role]["problem"].startswith(f"no {role}: expected a topic of type ")
         assert remedy in view["roles"][role]["problem"]
-        assert view["roles"][role]["problem"] in text
+        assert as_options(view["roles"][role]["problem"]) in text
 
 
 def test_no_messages_at_all(inspect, navirl, tmp_path):
@@ -261,9 +262,9 @@ def test_simulated_stamps_are_told(inspect, navirl, tmp_path):
     clock = nav.simulated(928.8)
     said, offsets = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
     (note,) = said
-    assert "/odom begins at 928.80 s; extract goes by the stamps, unless --time log" in note
+    assert "/odom begins at 928.80 s; extract goes by the stamps, unless `time` log" in note
     assert offsets["/wrench"] == pytest.approx(928.8 - nav.START_NS / 1e9, abs=0.01)
-    assert f"\nclock: {note}\n" in navirl("inspect", tmp_path / "run.mcap").stdout
+    assert f"\nclock: {as_options(note)}\n" in navirl("inspect", tmp_path / "run.mcap").stdout
 
 
 def test_another_computers_clock_is_told(inspect, tmp_path):
@@ -280,7 +281,7 @@ def test_a_recorder_whose_clock_is_off_is_told(inspect, tmp_path):
     said, _ = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
     (note,) = said
     assert note.startswith("header stamps of /odom differ by -7.50")
-    assert note.endswith(" s from the recorder's clock; extract goes by the stamps, unless --time log")
+    assert note.endswith(" s from the recorder's clock; extract goes by the stamps, unless `time` log")
 
 
 def test_stamps_of_0_are_told(inspect, tmp_path):

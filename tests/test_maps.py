@@ -60,7 +60,7 @@ def test_a_map_in_another_frame_that_is_only_shifted(load):
 
 TURNED = (
     r"^run.mcap: the map's frame 'floor' is turned against 'map' or moves in it, so that its cells cannot be kept; "
-    r"choose --frame floor, or give a map in 'map' with --map$"
+    r"choose `frame` floor, or give a map in 'map' with `map`$"
 )
 
 
@@ -102,9 +102,9 @@ def test_a_map_whose_own_cells_are_turned(load):
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("width", 7, r"^run.mcap: expected a map of 4 x 7 cells, found 24; record the map anew$"),
-        ("height", 0, r"^run.mcap: expected a map of 0 x 6 cells, found 24; record the map anew$"),
-        ("width", 2**32 - 1, r"^run.mcap: expected a map of 4 x 4294967295 cells, found 24; record the map anew$"),
+        ("width", 7, r"^run.mcap: expected a map of 4 x 7 cells, found 24; record the map again$"),
+        ("height", 0, r"^run.mcap: expected a map of 0 x 6 cells, found 24; record the map again$"),
+        ("width", 2**32 - 1, r"^run.mcap: expected a map of 4 x 4294967295 cells, found 24; record the map again$"),
         ("resolution", -0.05, r"expected a map with a positive resolution and a finite origin, found -0.05"),
         (
             "resolution",
@@ -123,10 +123,10 @@ def test_numbers_that_contradict_each_other(load, field, value, message):
 def test_an_origin_that_is_none_and_a_map_without_cells(load):
     grid = drawn(origin=(np.nan, 0.0))
     with pytest.raises(
-        LogError, match=r"a finite origin, found 0.05\d* m and \(nan, 0.0\); record the map anew, or give"
+        LogError, match=r"a finite origin, found 0.05\d* m and \(nan, 0.0\); record the map again, or give"
     ):
         load(grid)
-    with pytest.raises(LogError, match=r"^run.mcap: expected a map of 0 x 0 cells, found 0; record the map anew$"):
+    with pytest.raises(LogError, match=r"^run.mcap: expected a map of 0 x 0 cells, found 0; record the map again$"):
         load(nav.grid(0, 0))
 
 

@@ -186,7 +186,7 @@ def test_a_wrench_in_a_frame_that_tf_does_not_know(load):
     run = Run().odometry(frame="map", child="base")
     message = (
         r"^run.mcap: the wrench is given in frame 'base_link': transform from 'base_link' to 'base': expected .*; "
-        r"or say with --wrench-frame which frame its axes are parallel to$"
+        r"or say with `wrench_frame` which frame its axes are parallel to$"
     )
     with pytest.raises(FrameError, match=message):
         load(run)
@@ -228,7 +228,7 @@ def test_tf_of_another_time(load):
     run = Run().odometry().tf(lambda _: (5.0, 0.0), 1000 + np.arange(20) / 10)
     message = (
         r"^run.mcap: the transform from 'odom' to 'map' is known at no time of /odom; check that tf and odometry are "
-        r"stamped by the same clock, or try --time log$"
+        r"stamped by the same clock, or try `time` log$"
     )
     with pytest.raises(FrameError, match=message):
         load(run)
@@ -240,7 +240,7 @@ def test_stamps_of_another_clock_can_be_set_aside(load):
         at = int(nav.unix(second))
         run.log.add("/odom", nav.odometry(10**12 + at, *run.true(second)), at)
         run.log.add("/tf", nav.tf(nav.transform(at, "map", "odom", 5.0, 0.0)), at)
-    with pytest.raises(FrameError, match=r"known at no time of /odom; .*, or try --time log$"):
+    with pytest.raises(FrameError, match=r"known at no time of /odom; .*, or try `time` log$"):
         load(run)
     check_true(load(run, time=TimeSource.LOG), run, xy_m=(5.0, 0.0))
 

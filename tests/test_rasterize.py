@@ -194,5 +194,5 @@ def test_a_path_within_one_cell_is_that_cell(rule):
 
 def test_a_rule_that_walks_on_and_on_is_stopped_and_says_where(monkeypatch):
     monkeypatch.setattr("navirl_cli.demos.rasterize.PATIENCE", 0)
-    with pytest.raises(DemonstrationError, match=r"circles near x -2\.95 m, y 0\.10 m.*coarser --resolution"):
+    with pytest.raises(DemonstrationError, match=r"circles near x -2\.95 m, y 0\.10 m.*coarser `resolution`"):
         rasterize(np.array([[-2.95, 0.1], [2.95, 0.1]]), GRID)

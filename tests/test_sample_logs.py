@@ -78,7 +78,7 @@ def test_contacts_hold_the_impulse_and_leave_out_the_rest(pairs):
             assert size[inside].sum() >= 0.95 * size.sum(), d.id
             if true.condition == "force":
                 given = true.force_n.sum(axis=0) * 0.01
-                felt = np.sum([contact.impulse_ns for contact in d.contacts], axis=0)
+                felt = np.sum([contact.impulse_n_s for contact in d.contacts], axis=0)
                 assert np.hypot(*(felt - given)) < 0.05 * size.sum() * 0.01, d.id
 
 

@@ -99,7 +99,7 @@ def test_a_recording_of_nav2(pick):
     assert found["tf"].reason == "the only one that fits"
     problem = found["people"].problem
     assert problem.startswith("no people: expected a topic of type people_msgs/People or spencer_tracking_msgs/")
-    assert problem.endswith("say where they stand with --person x,y")
+    assert problem.endswith("say where they stand with `person` x,y")
 
 
 @pytest.mark.parametrize(
@@ -186,10 +186,10 @@ def test_equal_candidates_are_the_users_choice(pick, topics, role, types):
     found = pick(topics)[role]
     assert found.ambiguous
     assert found.problem == (
-        f"several topics could be the {role} ({types}): {first}, {second}; choose one with --topic {role}={first}"
+        f"several topics could be the {role} ({types}): {first}, {second}; choose one with `topic` {role}={first}"
     )
     chosen = pick(topics, **{role: second})[role]
-    assert ([topic.name for topic in chosen.topics], chosen.reason) == ([second], "named by --topic")
+    assert ([topic.name for topic in chosen.topics], chosen.reason) == ([second], "named by `topic`")
 
 
 @pytest.mark.parametrize(
@@ -197,19 +197,19 @@ def test_equal_candidates_are_the_users_choice(pick, topics, role, types):
     [
         (
             {"wheel": ("/odom",)},
-            "--topic: no role is called wheel; roles are wrench, odometry, map, people, goal, joystick, tf, tf_static",
+            "`topic`: no role is called wheel; roles are wrench, odometry, map, people, goal, joystick, tf, tf_static",
         ),
         (
             {"tf": ("/odom",)},
-            "run.mcap: --topic tf=/odom: expected tf2_msgs/TFMessage, found nav_msgs/Odometry",
+            "run.mcap: `topic` tf=/odom: expected tf2_msgs/TFMessage, found nav_msgs/Odometry",
         ),
         (
             {"map": ("/maps",)},
-            "run.mcap: --topic map=/maps: expected nav_msgs/OccupancyGrid, found no such topic",
+            "run.mcap: `topic` map=/maps: expected nav_msgs/OccupancyGrid, found no such topic",
         ),
         (
             {"map": ("/map", "/local_costmap/costmap")},
-            "run.mcap: --topic map: expected one topic, found /map and /local_costmap/costmap; choose one",
+            "run.mcap: `topic` map: expected one topic, found /map and /local_costmap/costmap; choose one",
         ),
     ],
 )
@@ -232,12 +232,12 @@ def test_what_is_named_twice_is_meant_once(tmp_path):
 
 def test_a_topic_without_messages_is_told(pick, tmp_path):
     found = pick({"/scan": "sensor_msgs/msg/LaserScan", "/map": GRID, "/a_pose": POSE})
-    assert "if /a_pose is meant, --topic odometry=/a_pose; record the robot's odometry" in found["odometry"].problem
+    assert "if /a_pose is meant, `topic` odometry=/a_pose; record the robot's odometry" in found["odometry"].problem
     topics = topics_of([scan(tmp_path / "run.mcap")])
     assert str(refusal("run.mcap", topics, found["wrench"])) == (
         "run.mcap: no wrench: expected a topic of type geometry_msgs/WrenchStamped or geometry_msgs/Wrench; record the "
         "force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster, or extract with "
-        "--no-wrench; the log holds "
+        "`no_wrench`; the log holds "
         "/a_pose (geometry_msgs/PoseStamped), /map (nav_msgs/OccupancyGrid), /scan (sensor_msgs/LaserScan)"
     )
     empty = nav.Log().write(tmp_path / "run.mcap")

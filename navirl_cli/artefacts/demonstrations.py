@@ -43,7 +43,18 @@ def gain_document(gains: Sequence[tuple[str, Gain | None]]) -> dict[str, Any] | 
     known = [(log, gain) for log, gain in gains if gain is not None]
     if not known:
         return None
-    return {**vars(pooled([gain for _, gain in known])), "logs": [{"log": log, **vars(gain)} for log, gain in known]}
+    logs = [{"log": log, **_gain_written(gain)} for log, gain in known]
+    return {**_gain_written(pooled([gain for _, gain in known])), "logs": logs}
+
+
+def _gain_written(gain: Gain) -> dict[str, Any]:
+    """A gain as JSON."""
+    return {
+        "m_s_per_n": gain.gain_m_s_n,
+        "standard_error": gain.standard_error_m_s_n,
+        "pushes": gain.pushes,
+        "delay_s": gain.delay_s,
+    }
 
 
 def read_demonstrations(path: Path) -> list[Demonstration]:
@@ -91,8 +102,8 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
             {
                 "start_s": round(contact.start_s, DECIMALS),
                 "end_s": round(contact.end_s, DECIMALS),
-                "peak_n": round(contact.peak_n, DECIMALS),
-                "impulse_ns": _rounded(np.array(contact.impulse_ns)),
+                "peak_n": round(contact.peak_force_n, DECIMALS),
+                "impulse_ns": _rounded(np.array(contact.impulse_n_s)),
             }
             for contact in d.contacts
         ],

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.smoothing import smoothing_spline
 
 #: Length of the stretches whose steadiness is judged, s.
 STRETCH_S = 0.25
@@ -17,8 +18,8 @@ FREE_PER_MIN, PRICE_S, MOST_PRICE_S = 0.5, 20.0, 60.0
 STEP = 0.5
 #: So many bins may lie between two that show the bias.
 LOOK_BACK = 300
-#: Changes of the bias within this time are smoothed, s.
-BEND_S = 10.0
+#: Changes of the bias within this time are smoothed, s; fewer bins between two steps hold one constant.
+BEND_S, _FEWEST = 10.0, 5
 
 
 def bias_of(t_s: FloatArray, force_n: FloatArray, begins_n: float) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -145,16 +146,13 @@ def _smooth(at_s: FloatArray, level_n: FloatArray, steps: IntArray) -> FloatArra
     The spline minimises the sum of squares plus BEND_S^4 / BIN_S times the integral of its squared second derivative;
     it ends straight, so that it follows a steady drift up to its ends.
     """
-    from scipy.interpolate import make_smoothing_spline
-
     parts = []
     for part in np.split(np.arange(len(at_s)), steps + 1):
         x, y = at_s[part], level_n[part]
-        if len(part) < 5:  # a spline takes no fewer
+        if len(part) < _FEWEST:
             parts.append(np.tile(y.mean(axis=0), (len(part), 1)))
         else:
-            fits = [make_smoothing_spline(x, axis, lam=BEND_S**4 / BIN_S)(x) for axis in y.T]
-            parts.append(np.stack(fits, axis=1))
+            parts.append(smoothing_spline(x, y, BEND_S**4 / BIN_S))
     return np.concatenate(parts)
 
 

@@ -26,12 +26,12 @@ def check_cells(cells: IntArray, xy_m: FloatArray, grid: Grid, robot_radius_m: f
     if blocked > MOST_BLOCKED * len(cells):
         raise DemonstrationError(
             f"{blocked} of {len(cells)} driven cells are occupied on the map grown by {robot_radius_m:g} m; "
-            "check the map and --robot-radius"
+            "check the map and `robot_radius`"
         )
     if path_length_m(grid.centres_of(cells)) < LOOPS * path_length_m(thinned(xy_m, grid.resolution_m)):
         raise DemonstrationError(
             f"{path_length_m(xy_m):.1f} m driven become {len(cells)} cells: the way crosses itself, and the rule from "
-            "poses to cells cuts loops off; split the log into trials that do not, or try --rasterizer chain"
+            "poses to cells cuts loops off; split the log into trials that do not, or try `rasterizer` chain"
         )
 
 
@@ -62,7 +62,7 @@ def check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
         if distance < radius_m:
             raise DemonstrationError(
                 f"a person at x {x:.2f} m, y {y:.2f} m stands on the path's start ({distance:.2f} m from the robot's "
-                f"centre, radius {radius_m:.2f} m); check --person, the people topic's frame and --robot-radius"
+                f"centre, radius {radius_m:.2f} m); check `person`, the people topic's frame and `robot_radius`"
             )
 
 
@@ -73,7 +73,7 @@ def check_goal(grid: Grid, start: FloatArray, goal: tuple[float, float]) -> None
         return
     raise DemonstrationError(
         f"goal unreachable: no free way on the map from x {start[0]:.2f} m, y {start[1]:.2f} m to x {goal[0]:.2f} m, "
-        f"y {goal[1]:.2f} m; check the goal, the map and --robot-radius"
+        f"y {goal[1]:.2f} m; check the goal, the map and `robot_radius`"
     )
 
 
@@ -86,7 +86,7 @@ def recording_notes(recording: Recording, pushes: Pushes | None, push: PushSetti
             "and speeds are not measured"
         )
     if is_costmap(recording.occupancy.data):
-        notes.append("its map is a costmap that is inflated already (cells of 99); --robot-radius does not grow it")
+        notes.append("its map is a costmap that is inflated already (cells of 99); `robot_radius` does not grow it")
     return [f"{recording.log}: {note}" for note in notes]
 
 
@@ -98,7 +98,7 @@ def _wrench_notes(pushes: Pushes, push: PushSettings) -> list[str]:
     if push.begins_n < least:
         notes.append(
             f"without contact the force still shakes by {pushes.noise_n:.2f} N, so that contacts from "
-            f"{push.begins_n:g} N on may be noise; raise --contact-force to {least:.1f}"
+            f"{push.begins_n:g} N on may be noise; raise `contact_force` to {least:.1f}"
         )
     holes = int((np.diff(pushes.t_ns) > FORCE_HOLE_S * 1e9).sum())
     if holes:
@@ -120,7 +120,7 @@ def people_notes(recording: Recording, people: FloatArray) -> list[str]:
     """Nobody there at all, or where none can stand: in a wall, or off the map."""
     if len(people) == 0:
         told = len(recording.people_t_ns) > 0
-        return ["nobody is in the scene" if told else "no people in the scene; say where they stand with --person x,y"]
+        return ["nobody is in the scene" if told else "no people in the scene; say where they stand with `person` x,y"]
     occupancy = recording.occupancy
     walls = Grid(occupancy.data >= OCCUPIED_FROM, occupancy.resolution_m, occupancy.origin_m)
     inside, blocked = walls.contains(walls.cells_of(people)), walls.is_occupied(walls.cells_of(people))

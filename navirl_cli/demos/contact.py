@@ -7,6 +7,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.bias import bias_of
 from navirl_cli.demos.demonstration import Contact
+from navirl_cli.demos.smoothing import low_passed
 from navirl_cli.errors import LogError
 from navirl_cli.logs.recording import Recording
 
@@ -71,7 +72,7 @@ def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     seconds = (wrench.t_ns - wrench.t_ns[0]) / 1e9
     bias, quiet = bias_of(seconds, wrench.force_n, settings.begins_n)
     base = np.einsum("...ij,...j->...i", wrench.to_base[..., :2, :], wrench.force_n - bias)
-    smooth = _low_pass(base, 1 / float(np.median(np.diff(seconds))), settings.cutoff_hz)
+    smooth = low_passed(base, 1 / float(np.median(np.diff(seconds))), settings.cutoff_hz)
     yaw = np.interp(wrench.t_ns, recording.t_ns, np.unwrap(recording.yaw_rad))
     cos, sin = np.cos(yaw), np.sin(yaw)
     force = np.stack([cos * smooth[:, 0] - sin * smooth[:, 1], sin * smooth[:, 0] + cos * smooth[:, 1]], axis=1)
@@ -135,16 +136,6 @@ def missing_s(pushes: Pushes, start_ns: int, stop_ns: int) -> float:
     """Longest time within a trial for which there is no force, s."""
     inside = pushes.t_ns[(pushes.t_ns > start_ns) & (pushes.t_ns < stop_ns)]
     return float(np.diff(np.concatenate([[start_ns], inside, [stop_ns]])).max() / 1e9)
-
-
-def _low_pass(force_n: FloatArray, rate_hz: float, cutoff_hz: float) -> FloatArray:
-    """Butterworth of second order, run both ways: no delay."""
-    from scipy.signal import butter, sosfiltfilt
-
-    if cutoff_hz >= rate_hz / 2:
-        return force_n
-    smooth: FloatArray = sosfiltfilt(butter(2, cutoff_hz, fs=rate_hz, output="sos"), force_n, axis=0)
-    return smooth
 
 
 def _tidy(spans: IntArray, t_ns: IntArray) -> IntArray:

@@ -28,9 +28,9 @@ class Contact:
     start_s: float
     end_s: float
     #: Largest horizontal force, N.
-    peak_n: float
+    peak_force_n: float
     #: Integral of the horizontal force, (x, y) in N s, map frame.
-    impulse_ns: tuple[float, float]
+    impulse_n_s: tuple[float, float]
 
     @property
     def duration_s(self) -> float:
@@ -40,7 +40,7 @@ class Contact:
     @property
     def direction_rad(self) -> float:
         """Direction of the impulse in the map frame, from the x axis, rad."""
-        return float(np.arctan2(self.impulse_ns[1], self.impulse_ns[0]))
+        return float(np.arctan2(self.impulse_n_s[1], self.impulse_n_s[0]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.contact import Pushes
 from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.smoothing import lagged
 from navirl_cli.logs.recording import Recording
 
 #: Everything is put on a clock of this step, s; every so many steps are a sample.
@@ -27,8 +28,8 @@ LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 class Gain:
     """An estimate of k, in (m/s)/N."""
 
-    m_s_per_n: float
-    standard_error: float
+    gain_m_s_n: float
+    standard_error_m_s_n: float
     #: Number of pushes that it comes from.
     pushes: int
     #: Mean time by which the velocity follows the force, s.
@@ -98,11 +99,11 @@ def gain_of(
 
 def pooled(gains: Sequence[Gain]) -> Gain:
     """One gain from several recordings of one robot: their mean, weighted by the inverse of their variances."""
-    weight = np.array([1 / max(gain.standard_error, 1e-12) ** 2 for gain in gains])
+    weight = np.array([1 / max(gain.standard_error_m_s_n, 1e-12) ** 2 for gain in gains])
     weight /= weight.sum()
     return Gain(
-        float(weight @ [gain.m_s_per_n for gain in gains]),
-        float(np.sqrt(weight**2 @ [gain.standard_error**2 for gain in gains])),
+        float(weight @ [gain.gain_m_s_n for gain in gains]),
+        float(np.sqrt(weight**2 @ [gain.standard_error_m_s_n**2 for gain in gains])),
         sum(gain.pushes for gain in gains),
         float(weight @ [gain.delay_s for gain in gains]),
     )
@@ -184,13 +185,9 @@ def _without(values: FloatArray, aside: FloatArray, piece: IntArray) -> FloatArr
     return values - factor[piece] * aside
 
 
-def _lagged(integral: FloatArray, lag_s: float) -> FloatArray:
+def _late(integral: FloatArray, lag_s: float) -> FloatArray:
     """What has this integral after a first-order lag, as an integral again."""
-    from scipy.signal import lfilter
-
-    keep = np.exp(-STEP_S / lag_s) if lag_s else 0.0
-    late: FloatArray = lfilter([1 - keep], [1, -keep], integral)
-    return late
+    return lagged(integral, float(np.exp(-STEP_S / lag_s))) if lag_s else integral
 
 
 def _fitted(
@@ -199,21 +196,21 @@ def _fitted(
     """The gain with the dead time and the lag that explain the most, and its standard error."""
     best, delay, lag = -1.0, 0.0, 0.0
     for tried in LAGS_S:
-        late = _lagged(impulse, tried)
+        late = _late(impulse, tried)
         for wait in DELAYS_S.tolist():
             force = answer(late, wait)
             explained = float((force @ velocity) ** 2 / (force @ force))
             if explained > best:
                 best, delay, lag = explained, wait, tried
-    force = answer(_lagged(impulse, lag), delay)
+    force = answer(_late(impulse, lag), delay)
     k = float(force @ velocity / (force @ force))
     # Delay and lag were estimated too, and cost certainty where they are not at the end of their range.
     slopes = [force]
     if delay > 0:
-        earlier, later = (answer(_lagged(impulse, lag), delay + change) for change in (-0.02, 0.02))
+        earlier, later = (answer(_late(impulse, lag), delay + change) for change in (-0.02, 0.02))
         slopes.append(k * (later - earlier) / 0.04)
     if lag > 0:
-        shorter, longer = (answer(_lagged(impulse, lag * factor), delay) for factor in (0.9, 1.1))
+        shorter, longer = (answer(_late(impulse, lag * factor), delay) for factor in (0.9, 1.1))
         slopes.append(k * (longer - shorter) / (0.2 * lag))
     variance = _covariance(np.stack(slopes, axis=1), velocity - k * force, samples.stretch)[0, 0]
     return Gain(k, float(np.sqrt(variance)), samples.pushes, delay + lag)

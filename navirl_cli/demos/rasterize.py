@@ -78,7 +78,7 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
             x, y = grid.centres_of(here)
             raise DemonstrationError(
                 f"the path could not be put on the grid: it circles near x {x:.2f} m, y {y:.2f} m; "
-                "split the log into trials, or choose a coarser --resolution"
+                "split the log into trials, or choose a coarser `resolution`"
             )
         options = here + MOVES
         if before is not None:

@@ -18,7 +18,7 @@ ARRIVED_M = 0.5
 SAME_GOAL_M = 0.05
 #: A trial of the session record this near in time is the one that starts here, s.
 SAME_START_S = 1.0
-#: A rest of this length parts two trials for --split stop, s.
+#: A rest of this length separates two trials where they are split at stops, s.
 REST_S = 1.0
 #: A trial that covers less is none, m.
 MIN_TRAVEL_M = 0.5
@@ -71,7 +71,7 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
     if len(recording.goal_t_ns) == 0:
         raise DemonstrationError(
             f"{recording.log}: no goal is announced, so that trials cannot be split at goals; "
-            "say where it is with --goal x,y, or choose --split stop or --split none"
+            "say where it is with `goal` x,y, or choose `split` stop or `split` none"
         )
     return _at_goals(recording, standing)
 

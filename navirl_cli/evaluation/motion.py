@@ -65,8 +65,8 @@ def contact_values(d: Demonstration) -> dict[str, float]:
     names = ("contact_share", "peak_n", "impulse_ns", "work_j")
     if d.contacts is None or d.contact_s is None or d.force_n is None:
         return dict.fromkeys(names, float("nan"))
-    peak = max((contact.peak_n for contact in d.contacts), default=0.0)
-    impulse = sum(float(np.hypot(*contact.impulse_ns)) for contact in d.contacts)
+    peak = max((contact.peak_force_n for contact in d.contacts), default=0.0)
+    impulse = sum(float(np.hypot(*contact.impulse_n_s)) for contact in d.contacts)
     return dict(zip(names, (d.contact_s / d.duration_s, peak, impulse, _work_j(d)), strict=True))
 
 

@@ -199,7 +199,7 @@ def _name_contacts(axes: Axes, one: Demonstration) -> list[Annotation]:
 
 def _told(contact: Contact) -> str:
     """Peak and impulse in numbers."""
-    return f"{contact.peak_n:.1f} N\n{np.hypot(*contact.impulse_ns):.1f} N s"
+    return f"{contact.peak_force_n:.1f} N\n{np.hypot(*contact.impulse_n_s):.1f} N s"
 
 
 def _contact_handles(one: Demonstration) -> list[Patch]:

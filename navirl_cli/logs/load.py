@@ -102,7 +102,7 @@ def _loaded(source: Source, files: Sequence[RawFile], options: LoadOptions, prog
     occupancy = occupancy_of(map_and_frame, context)
     lost = (*map(str, (*source.damage, *damage)), *context.lost)
     if lost and options.strict:
-        raise LogError(f"{log}: damaged, and --strict refuses it: {'; '.join(lost)}")
+        raise LogError(f"{log}: damaged, and `strict` refuses it: {'; '.join(lost)}")
     return Recording(
         log=log,
         t_ns=poses.t_ns,
@@ -160,7 +160,7 @@ def _context(
     if not references:
         raise LogError(
             f"{log}: expected odometry or a wrench, whose stamps are the recording's clock, found neither; "
-            "name the odometry with --topic odometry=/name"
+            "name the odometry with `topic` odometry=/name"
         )
     clock = Clock(references[0].stamped(), options.time)
     tree = TransformTree(

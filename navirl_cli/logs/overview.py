@@ -183,7 +183,7 @@ def _clocks(choices: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> li
         differ_s = clock.offset_ns / NS_PER_S
         notes.append(f"header stamps of {reference} differ by {differ_s:+.3f} s from the recorder's clock")
     if notes:
-        notes[0] += "; extract goes by the stamps, unless --time log"
+        notes[0] += "; extract goes by the stamps, unless `time` log"
     for role in ("wrench", "people"):
         for name in names.get(role, ()):
             if name in stamped and name != reference:

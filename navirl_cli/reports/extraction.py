@@ -29,7 +29,7 @@ FORMATS = {
 def trial_row(d: Demonstration) -> dict[str, Any]:
     """One trial of the table, by its columns."""
     contacts = d.contacts or ()
-    strongest = max(contacts, key=lambda contact: hypot(*contact.impulse_ns), default=None)
+    strongest = max(contacts, key=lambda contact: hypot(*contact.impulse_n_s), default=None)
     values = (
         d.id,
         d.condition.value,
@@ -40,8 +40,8 @@ def trial_row(d: Demonstration) -> dict[str, Any]:
         len(d.cells),
         None if d.contacts is None else len(d.contacts),
         None if d.contact_s is None else 100 * d.contact_s / d.duration_s,
-        max((contact.peak_n for contact in contacts), default=None),
-        None if d.contacts is None else sum(hypot(*contact.impulse_ns) for contact in contacts),
+        max((contact.peak_force_n for contact in contacts), default=None),
+        None if d.contacts is None else sum(hypot(*contact.impulse_n_s) for contact in contacts),
         None if strongest is None else degrees(strongest.direction_rad),
     )
     return dict(zip(FORMATS, values, strict=True))

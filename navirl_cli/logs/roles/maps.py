@@ -29,11 +29,11 @@ def map_in(log: str, topics: Sequence[Columns]) -> tuple[Occupancy, str]:
         found = f"{float(last['resolution'])} m and {origin}"
         raise LogError(
             f"{log}: expected a map with a positive resolution and a finite origin, found {found}; record the map "
-            "anew, or give it with --map"
+            "again, or give it with `map`"
         )
     height, width, size = int(last["height"]), int(last["width"]), int(columns.owner_counts[-1])
     if size != height * width or size == 0:
-        raise LogError(f"{log}: expected a map of {height} x {width} cells, found {size}; record the map anew")
+        raise LogError(f"{log}: expected a map of {height} x {width} cells, found {size}; record the map again")
     data = columns["data"][-size:].astype(np.int8)
     # A float32 of 0.1 is 0.10000000149 as a double: the shortest decimal is what was meant.
     resolution = float(str(np.float32(last["resolution"])))
@@ -63,7 +63,7 @@ def occupancy_of(map_and_frame: tuple[Occupancy, str], context: Context) -> Occu
     if np.abs(yaw).max() > 1e-3 or np.abs(moved - moved[0]).max() > occupancy.resolution_m / 10:
         raise LogError(
             f"{context.log}: the map's frame {frame!r} is turned against {context.fixed!r} or moves in it, so that its "
-            f"cells cannot be kept; choose --frame {frame}, or give a map in {context.fixed!r} with --map"
+            f"cells cannot be kept; choose `frame` {frame}, or give a map in {context.fixed!r} with `map`"
         )
     x, y = occupancy.origin_m
     return Occupancy(occupancy.data, occupancy.resolution_m, (x + float(moved[0, 0]), y + float(moved[0, 1])))

@@ -121,7 +121,7 @@ def _covered(topic: str, base: str, t_ns: IntArray, frame: str, context: Context
     if not covered.any():
         raise FrameError(
             f"{context.log}: the transform from {frame!r} to {fixed!r} is known at no time of {topic}; check that tf "
-            "and odometry are stamped by the same clock, or try --time log"
+            "and odometry are stamped by the same clock, or try `time` log"
         )
     if not covered.all():
         context.note(f"{int((~covered).sum())} poses lie outside the time that tf covers; left out")

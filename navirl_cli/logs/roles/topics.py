@@ -74,7 +74,7 @@ ROLES: Final = (
         message_types.WRENCHES,
         "unfiltered before filtered, since extract filters without delay",
         "record the force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster, "
-        "or extract with --no-wrench",
+        "or extract with `no_wrench`",
         needed=True,
     ),
     Role(
@@ -88,7 +88,7 @@ ROLES: Final = (
         "map",
         message_types.MAPS,
         "a map before a costmap, a global one before a local one",
-        "give the map's file with --map, or record it, usually /map; it is latched, so that ros2 bag needs its "
+        "give the map's file with `map`, or record it, usually /map; it is latched, so that ros2 bag needs its "
         "transient-local QoS override",
         needed=True,
     ),
@@ -96,19 +96,19 @@ ROLES: Final = (
         "people",
         message_types.PEOPLE,
         "messages that can only be about people first, then those whose names say so",
-        "say where they stand with --person x,y",
+        "say where they stand with `person` x,y",
     ),
     Role(
         "goal",
         message_types.GOALS,
         "a goal by name first, then any lone pose, then the end of a plan",
-        "say where it is with --goal x,y, or choose --split stop or --split none",
+        "say where it is with `goal` x,y, or choose `split` stop or `split` none",
     ),
     Role(
         "joystick",
         message_types.COMMANDS,
         "joysticks, and velocities whose topics say that a hand gives them; navigation publishes on the others",
-        "name the topic of velocities that a hand gave with --topic joystick=/name",
+        "name the topic of velocities that a hand gave with `topic` joystick=/name",
         ranked=False,
     ),
     Role(
@@ -165,7 +165,7 @@ def choose(log: str, topics: Mapping[str, Topic], requested: Mapping[str, Sequen
     """
     unknown = sorted(set(requested) - {role.name for role in ROLES})
     if unknown:
-        raise LogError(f"--topic: no role is called {unknown[0]}; roles are {', '.join(role.name for role in ROLES)}")
+        raise LogError(f"`topic`: no role is called {unknown[0]}; roles are {', '.join(role.name for role in ROLES)}")
     return {role.name: _choice(log, role, topics, requested.get(role.name, ())) for role in ROLES}
 
 
@@ -175,8 +175,8 @@ def _choice(log: str, role: Role, topics: Mapping[str, Topic], requested: Sequen
         named = tuple(_requested(log, role, topics, name) for name in dict.fromkeys(requested))
         if len(named) > 1 and not role.joins:
             names = " and ".join(topic.name for topic in named)
-            raise LogError(f"{log}: --topic {role.name}: expected one topic, found {names}; choose one")
-        return Choice(role, named, "named by --topic")
+            raise LogError(f"{log}: `topic` {role.name}: expected one topic, found {names}; choose one")
+        return Choice(role, named, "named by `topic`")
     types = {one.name for one in role.message_types}
     of_type = [topic for topic in topics.values() if topic.type_name in types]
     ranks = {topic: rank for topic in of_type if topic.count and (rank := role.rank(topic)) is not None}
@@ -187,7 +187,7 @@ def _choice(log: str, role: Role, topics: Mapping[str, Topic], requested: Sequen
         names = ", ".join(topic.name for topic in best)
         shown = ", ".join(sorted({short_name(topic.type_name) for topic in best}))
         problem = f"several topics could be the {role.name} ({shown}): {names}"
-        return Choice(role, (), "", f"{problem}; choose one with --topic {role.name}={best[0].name}", ambiguous=True)
+        return Choice(role, (), "", f"{problem}; choose one with `topic` {role.name}={best[0].name}", ambiguous=True)
     others = [topic.name for topic in ranks if topic not in best]
     skipped = [topic.name for topic in of_type if role.rule and topic.count and topic not in ranks]
     reason = f"{role.rule}; not {', '.join(others)}" if others else "the only one that fits"
@@ -201,7 +201,7 @@ def _requested(log: str, role: Role, topics: Mapping[str, Topic], name: str) -> 
     if topic is None or topic.type_name not in types:
         found = "no such topic" if topic is None else short_name(topic.type_name)
         raise LogError(
-            f"{log}: --topic {role.name}={name}: expected {' or '.join(map(short_name, types))}, found {found}"
+            f"{log}: `topic` {role.name}={name}: expected {' or '.join(map(short_name, types))}, found {found}"
         )
     return topic
 
@@ -213,7 +213,7 @@ def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     unlikely = [topic.name for topic in of_type if topic.count]
     notes = f"; {', '.join(empty)} has no messages" if empty else ""
     if unlikely:
-        notes += f"; if {' or '.join(unlikely)} is meant, --topic {role.name}={unlikely[0]}"
+        notes += f"; if {' or '.join(unlikely)} is meant, `topic` {role.name}={unlikely[0]}"
     return f"no {role.name}: expected a topic of type {types}{notes}" + (f"; {role.remedy}" if role.remedy else "")
 
 

@@ -33,7 +33,7 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
     frame = named or own
     if not frame:
         context.note(
-            f"{columns.topic} names no frame; it is taken to be {base!r}, unless --wrench-frame says otherwise"
+            f"{columns.topic} names no frame; it is taken to be {base!r}, unless `wrench_frame` says otherwise"
         )
         frame = base
     stamps, rows = context.ordered_times(columns)
@@ -43,7 +43,7 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         mounted = context.tree.lookup(base, frame, t_ns[:1] if span is None else np.clip(t_ns, *span))
     except FrameError as error:
         raise FrameError(
-            f"{context.log}: the wrench is given in frame {frame!r}: {error}; or say with --wrench-frame which frame "
+            f"{context.log}: the wrench is given in frame {frame!r}: {error}; or say with `wrench_frame` which frame "
             "its axes are parallel to"
         ) from error
     turns = mounted.rotation.as_matrix()
