@@ -54,14 +54,17 @@ class LazyGroup(click.Group):
             formatter.write_dl(list(COMMANDS.items()))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; known trouble becomes one line on stderr and exit code 1."""
+        """Run a command; expected errors and Ctrl-C become one line on stderr and an exit code."""
         try:
             return super().invoke(ctx)
         except NavirlError as error:
             if ctx.params.get("debug"):
                 raise
-            click.echo(f"navirl: {as_options(str(error))}", err=True)
-            ctx.exit(1)
+            line, code = as_options(str(error)), 1
+        except KeyboardInterrupt:
+            line, code = "interrupted", 130  # as a shell reports a process that SIGINT ended
+        click.echo(f"navirl: {line}", err=True)
+        return ctx.exit(code)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 
@@ -35,17 +35,29 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def make_folder(path: Path) -> Path:
-    """Make a folder where it is missing, with those above it.
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Make a folder for results where it is missing, with those above it.
+
+    Yields:
+        The folder. Folders that were made here and are still empty when the block ends are removed again, also after
+        an exception or an interrupt.
 
     Raises:
         ArtefactError: It cannot be made.
     """
+    made: list[Path] = []
     try:
+        made = [one for one in (path, *path.parents) if not one.exists()]
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be made a folder: {error.strerror}; choose another `output`") from error
-    return path
+    try:
+        yield path
+    finally:
+        with suppress(OSError):  # of the first that holds something; those above it hold it
+            for one in made:
+                one.rmdir()
 
 
 def check_writable(path: Path, *, force: bool) -> None:

@@ -1,8 +1,12 @@
 """Work over many logs or fits, through one function that any executor can stand behind."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from types import FrameType
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -33,5 +37,67 @@ def map_in_order(
     elif workers < 2:
         yield from map(function, items)
     else:
-        with ProcessPoolExecutor(workers) as pool:
-            yield from pool.map(function, items)
+        with ProcessPoolExecutor(workers, initializer=_Worker.listen) as pool:
+            try:
+                with _no_interrupt():  # Python forgets one that comes while a process forks
+                    results = pool.map(partial(_Worker.run, function), items)
+                yield from results
+            except BaseException:
+                _Worker.interrupt_all()
+                raise
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """Have interrupts wait until the block ends; processes that begin in it let them wait until they listen."""
+    if not hasattr(signal, "pthread_sigmask"):  # as on Windows, which does not fork either
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Worker:
+    """What a local process does on an interrupt: what it works on cleans up after itself, and nothing else begins.
+
+    Without this, processes that wait for work print a traceback, and those that work go on until they are done.
+    """
+
+    busy = False
+    stopped = False
+
+    @classmethod
+    def listen(cls) -> None:
+        """Take interrupts from now on, in a new process."""
+        signal.signal(signal.SIGINT, cls._interrupted)
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+    @classmethod
+    def run(cls, function: Callable[[Item], Result], item: Item) -> Result:
+        """Work on an item, unless there was an interrupt."""
+        if cls.stopped:
+            raise KeyboardInterrupt
+        cls.busy = True
+        try:
+            return function(item)
+        finally:
+            cls.busy = False
+
+    @classmethod
+    def _interrupted(cls, _number: int, _frame: FrameType | None) -> None:
+        again, cls.stopped = cls.stopped, True
+        if cls.busy and not again:  # the second one would interrupt the cleaning up after the first
+            raise KeyboardInterrupt
+
+    @staticmethod
+    def interrupt_all() -> None:
+        """Interrupt the workers of this process: only those of a terminal's foreground get its Ctrl-C themselves."""
+        from multiprocessing import active_children
+
+        for child in active_children():
+            if os.name == "posix" and child.pid is not None:
+                os.kill(child.pid, signal.SIGINT)

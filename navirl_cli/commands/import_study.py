@@ -18,7 +18,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.errors import ArtefactError
-from navirl_cli.files import check_writable, make_folder
+from navirl_cli.files import check_writable, new_folder
 from navirl_cli.parallel import map_in_order
 from navirl_cli.published.runs import Run, runs_in
 
@@ -50,11 +50,10 @@ def import_study(runs: Path, output: Path, force: bool, as_json: bool) -> None:
     """
     found, lost = runs_in(runs)
     jobs = [(number, run, output / f"{run.name}.mcap") for number, run in enumerate(found)]
-    make_folder(output)
-    for _, _, path in jobs:
-        check_writable(path, force=force)
     imported = []
-    with progress_bar("import-study", len(jobs)) as update:
+    with new_folder(output), progress_bar("import-study", len(jobs)) as update:
+        for _, _, path in jobs:
+            check_writable(path, force=force)
         for one in map_in_order(partial(_imported, force=force), jobs):
             imported.append(one)
             update(len(imported), one.participant)

@@ -154,7 +154,7 @@ def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     if not sys.stderr.isatty():
         yield lambda _done, _total: None
         return
-    with click.progressbar(length=1, label=label, file=sys.stderr, width=30) as bar:
+    with _finished(click.progressbar(length=1, label=label, file=sys.stderr, width=30)) as bar:
 
         def update(done: int, total: int) -> None:
             if done < bar.pos:
@@ -180,11 +180,21 @@ def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[in
         yield lambda _done, _word: None
         return
     steps = None if length is not None else iter(int, 1)
-    with click.progressbar(
+    new = click.progressbar(
         steps, length=length, label=label, file=sys.stderr, item_show_func=lambda word: str(word or "")
-    ) as bar:
+    )
+    with _finished(new) as bar:
 
         def update(done: int, word: str) -> None:
-            bar.update(max(0, done - bar.pos), word)  # type: ignore[arg-type]
+            bar.update(max(0, done - bar.pos), word)
 
         yield update
+
+
+@contextmanager
+def _finished(bar: Any) -> Iterator[Any]:
+    """A bar whose line ends and gives the cursor back, also after an interrupt while it is drawn first."""
+    try:
+        yield bar.__enter__()
+    finally:
+        bar.__exit__(None, None, None)

@@ -7,7 +7,7 @@ import click
 
 from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option
 from navirl_cli.documents.tables import Cell, Column, Table, written
-from navirl_cli.files import check_writable, make_folder
+from navirl_cli.files import check_writable, new_folder
 from navirl_cli.parallel import map_in_order
 
 
@@ -23,12 +23,11 @@ def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
     from it: two passes, a fit, two passes along learnt paths, two passes with a joystick, one left to obstacle
     avoidance. What truly happened stands in the metadata record navirl.truth, which no other command reads.
     """
-    make_folder(output)
     paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
-    for path in paths:
-        check_writable(path, force=force)
     rows: list[tuple[Cell, ...]] = []
-    with progress_bar("simulate", participants) as update:
+    with new_folder(output), progress_bar("simulate", participants) as update:
+        for path in paths:
+            check_writable(path, force=force)
         work = partial(_simulated, seed=seed, force=force)
         for row in map_in_order(work, list(enumerate(paths, start=1))):
             rows.append(row)

@@ -29,7 +29,7 @@ from navirl_cli.commands.shared import (
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
 from navirl_cli.documents.tables import written
-from navirl_cli.files import check_writable, make_folder, replacing
+from navirl_cli.files import check_writable, new_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
@@ -85,24 +85,27 @@ def study(
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
-    figures = _folder(output, force=force)
-    given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
-    demonstrations = given.demonstrations
-    with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
-        found = study_of(demonstrations, given.completion_s, samples, seed, published=given.published, progress=update)
-    inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
-    settings = {"samples": samples, "seed": seed, "levels": levels}
-    numbers = study_document(found, given.cells, bars)
-    document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
-    write_json(output / SUMMARY, "study", document, force=force)
-    kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
-    write_json(output / DEMOS, "demonstrations", kept, force=force)
-    with progress_bar("draw", len(FIGURES)) as update:
-        drawn, missing = draw_study(found, bars, figures, force=force, progress=update)
-    lost = [*given.lost, *(line for one in (*found.participants, found.pooled) for line in one.trouble), *missing]
-    notes = [*merged(given.notes), *remarks(demonstrations, answers)]
-    told = Told(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
-    _write_report(output, found, told, force=force)
+    with new_folder(output / "figures") as figures:
+        _check_files(output, force=force)
+        given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
+        demonstrations = given.demonstrations
+        with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
+            found = study_of(
+                demonstrations, given.completion_s, samples, seed, published=given.published, progress=update
+            )
+        inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
+        settings = {"samples": samples, "seed": seed, "levels": levels}
+        numbers = study_document(found, given.cells, bars)
+        document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
+        write_json(output / SUMMARY, "study", document, force=force)
+        kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
+        write_json(output / DEMOS, "demonstrations", kept, force=force)
+        with progress_bar("draw", len(FIGURES)) as update:
+            drawn, missing = draw_study(found, bars, figures, force=force, progress=update)
+        lost = [*given.lost, *(line for one in (*found.participants, found.pooled) for line in one.trouble), *missing]
+        notes = [*merged(given.notes), *remarks(demonstrations, answers)]
+        told = Told(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
+        _write_report(output, found, told, force=force)
     if as_json:
         echo_json(document)
     else:
@@ -153,20 +156,18 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
     )
 
 
-def _folder(output: Path, *, force: bool) -> Path:
-    """Make the folders, and refuse early what could not be written at the end.
+def _check_files(output: Path, *, force: bool) -> None:
+    """Refuse early what could not be written at the end.
 
     Raises:
-        ArtefactError: A folder cannot be made, or a file exists already.
+        ArtefactError: A file exists already, or cannot be written.
     """
     from navirl_cli.figures.study import FORMATS
     from navirl_cli.reports.study import FIGURES
 
-    figures = make_folder(output / "figures")
-    names = [figures / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
+    names = [output / "figures" / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
     for path in (*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names):
         check_writable(path, force=force)
-    return figures
 
 
 def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[float, ...]]]:
