@@ -93,7 +93,7 @@ def test_extract_prints_a_row_a_trial(navirl, tmp_path):
 def test_extract_json_has_numbers(navirl, tmp_path):
     (row,) = json.loads(navirl("extract", log_with(tmp_path), "-o", "demos.json", "--json").stdout)
     assert (row["trial"], row["cells"], row["cycle"]) == ("run/1", 41, None)
-    assert row["impulse Ns"] == pytest.approx(24, abs=0.6)
+    assert row["impulse_n_s"] == pytest.approx(24, abs=0.6)
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,7 @@ def test_fit_reports_and_writes_the_reward(navirl, work):
     result = navirl("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "-o", "reward.json")
     lines = result.stdout.splitlines()
     assert [line.split()[0] for line in lines[1:5]] == ["c0", "a_g", "a_p", "sigma_p"]
-    assert "status            converged" in result.stdout
+    assert "Status: converged: " in result.stdout
     document = read_json(Path("reward.json"), "reward")
     assert document["demonstrations"] == ["p01/3", "p01/4"]
     assert document["participants"] == ["p01"]

@@ -16,6 +16,7 @@ from navirl_cli.documents.inline import Mark, Run, plain_of, runs_of
 from navirl_cli.documents.markdown import to_markdown
 from navirl_cli.documents.page import to_html
 from navirl_cli.documents.tables import Column, Spread, Table
+from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArtefactError
 
 DETERMINISTIC = settings(derandomize=True, deadline=None, max_examples=150)
@@ -194,6 +195,24 @@ def test_a_whole_report_in_markdown(picture, tmp_path):
         "Made by a test.",
     )
     assert to_markdown(report, tmp_path) == WHOLE
+
+
+def test_a_whole_report_as_text(picture):
+    blocks = (
+        Heading("Log `a`"),
+        Bullets(("2 s", "clock: **wrong**")),
+        Table((Column("topic"), Column("n")), (("/odom", 3),), "Topics.", "`-`: none."),
+        Paragraph(""),
+        Paragraph("Name it with `frame`."),
+        Picture(picture, "A **red** square."),
+        Heading("Empty"),
+        Bullets(()),
+    )
+    assert to_text(blocks) == (
+        "Log `a`\n- 2 s\n- clock: wrong\n\n"
+        "Topics.\ntopic  n\n/odom  3\n`-`: none.\n\n"
+        "Name it with `frame`.\n\nA red square.\n\nEmpty"
+    )
 
 
 def test_markdown_links_pictures_from_its_own_folder(tmp_path, monkeypatch):

@@ -1,7 +1,6 @@
 """``navirl fit`` with all that can be asked of it, and the figure of profiles: text, files, refusals."""
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
-from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.artefacts.rewards import read_reward, reward_document
 from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.demos.demonstration import Contact
@@ -82,19 +81,19 @@ def test_errors_by_participant_and_correlations_are_written_and_printed(files, e
     assert values_of(document, "standard_error_clustered") == pytest.approx(found.clustered_errors)
     assert np.array(document["covariance_clustered"]) == pytest.approx(found.clustered)
     assert document["condition_number"] == pytest.approx(found.condition_number)
-    assert text.splitlines()[0].split() == "parameter value std. error by participant unit meaning".split()  # noqa: SIM905
+    assert text.splitlines()[0].split() == "parameter value std. error by participant 95 % interval unit state".split()  # noqa: SIM905
     figures = found.reward.theta[2], found.standard_errors[2], found.clustered_errors[2]
     assert text.splitlines()[3].split()[:4] == ["a_p", *(f"{figure:.4f}" for figure in figures)]
     lines = [line.split() for line in text.splitlines()]
-    assert [row for row in lines if row[:1] == ["sigma_p"]][1][1:] == [f"{r:.2f}" for r in found.correlation[3, :3]]
-    assert f"condition number  {found.condition_number:.3g} of the correlations" in text
-    assert f"demonstrations    32 of 4 participants, {found.steps} steps" in text
+    assert [row for row in lines if row[:1] == ["sigma_p"]][1][1:] == [f"{r:.2f}" for r in found.correlation[3]]
+    assert f"Condition number of the correlations: {found.condition_number:.3g}." in text
+    assert f"32 demonstrations of 4 participants, {found.steps} steps; " in text
 
 
 def test_a_single_participant_has_no_errors_by_participant(navirl, files):
     text = navirl("fit", files / "one.json", "-o", "r.json").stdout
     assert "by participant" not in text
-    assert "8 of 1 participant, " in text
+    assert "8 demonstrations of 1 participant, " in text
     document = read_json(Path("r.json"), "reward")
     assert document["covariance_clustered"] is None
     assert values_of(document, "standard_error_clustered") == [None] * 4
@@ -108,8 +107,8 @@ def test_bootstrap(files, full):
     assert drawn["standard_errors"] == pytest.approx(theta.std(axis=0, ddof=1))
     assert drawn["lower"] == pytest.approx(np.percentile(theta, 2.5, axis=0))
     assert drawn["upper"] == pytest.approx(np.percentile(theta, 97.5, axis=0))
-    assert "bootstrap         6 draws of participants (seed 3)" in text
-    assert f"{drawn['lower'][0]:.4g} to {drawn['upper'][0]:.4g}" in text.splitlines()[1]
+    assert "Bootstrap: 6 draws of participants (seed 3)." in text
+    assert f"{drawn['lower'][0]:.4f} to {drawn['upper'][0]:.4f}" in text.splitlines()[1]
     assert "bootstrap 95 %" in text.splitlines()[0]
 
 
@@ -126,7 +125,8 @@ def test_profiles(files, full):
     }
     assert at[round(sigma_p["lower"], 9)] == pytest.approx(-fall_at(0.95), rel=2e-3)
     text = (files / "full.txt").read_text()
-    assert f"profile           sigma_p: 95 % interval {sigma_p['lower']:.4f} to {sigma_p['upper']:.4f}" in text
+    row = next(line for line in text.splitlines()[6:] if line.startswith("sigma_p") and " 95 " in line)
+    assert row.split()[1:4] == ["95", f"{sigma_p['lower']:.4f}", f"{sigma_p['upper']:.4f}"]
     back = read_reward(files / "full.json").profiles
     assert [one.name for one in back] == ["sigma_p", "a_g"]
     assert back[0].values == pytest.approx(sigma_p["values"])
@@ -145,8 +145,8 @@ def test_cross_validation(files, full, evidence):
     row = next(line for line in text.splitlines() if line.startswith("learnt "))
     assert row.split()[1] == f"{found['models']['learnt']['per_step']:.4f}"
     root = np.sqrt(np.mean(np.square(found["features"]["a_p"]["mismatch_standard_errors"])))
-    table = text[text.index("|f_demo - E f|") :].splitlines()
-    assert table[3].split()[:2] == ["a_p", f"{root:.2f}"]
+    table = text[text.index("|f - E f|") :].splitlines()
+    assert table[4].split()[:2] == ["a_p", f"{root:.2f}"]
 
 
 def test_json_on_stdout_is_what_is_in_the_file(navirl, files):
@@ -160,7 +160,7 @@ def test_adam(navirl, files):
     text = navirl("fit", files / "demos.json", "-o", "r.json", "--method", "adam").stdout
     document, newton = read_json(Path("r.json"), "reward"), read_json(files / "reward.json", "reward")
     assert (document["method"], document["status"]) == ("adam", "converged")
-    assert f"iterations        {document['iterations']} " in text
+    assert f"; {document['iterations']} iterations, " in text
     assert document["iterations"] > 3 * newton["iterations"]
     assert newton["log_likelihood"] - 1.0 < document["log_likelihood"] <= newton["log_likelihood"]
 
@@ -171,7 +171,7 @@ def test_steps_in_contact_alone(navirl, files, evidence):
     document = read_json(Path("r.json"), "reward")
     assert document["steps"] == sum(int(mask.sum()) for mask in masks) == 16 * 6
     assert values_of(document) == pytest.approx(fit(evidence.only(masks), Reward.named({}), 0.1).reward.theta, rel=1e-6)
-    assert "demonstrations    16 of 4 participants, 96 steps" in text
+    assert "16 demonstrations of 4 participants, 96 steps; " in text
     message = navirl("fit", files / "quiet.json", "-o", "q.json", "--steps", "contact", code=1).stderr
     assert message == "navirl: --steps contact: in none of the demonstrations did the person push\n"
 
@@ -255,23 +255,36 @@ def test_the_same_seed_writes_the_same_bytes(navirl, files):
     assert contents[1] != contents[2]
 
 
-def test_parameters_that_are_hardly_told_apart_are_named(evidence):
-    found = fit(evidence, Reward.named({}))
-    found = replace(found, participants=10)
-    assert warnings(found) == []
-    covariance = found.covariance.copy()
+def content_of(evidence):
+    """Of a reward file, as if all participants were p01 to p04 and all parameters certain."""
+    document = reward_document(fit(evidence, Reward.named({})), [], [], 0.1)
+    for one in document["parameters"]:
+        one["standard_error"] = 0.49 * abs(one["value"])
+    return {**document, "participants": ["p01", "p02", "p03", "p04"]}
+
+
+def test_strongly_correlated_parameters_are_named(evidence):
+    content = {**content_of(evidence), "participants": [f"p{n:02d}" for n in range(10)]}
+    assert warnings(content) == []
+    covariance = np.array(content["covariance"])
     covariance[1, 2] = covariance[2, 1] = -0.99 * np.sqrt(covariance[1, 1] * covariance[2, 2])
-    (line,) = warnings(replace(found, covariance=covariance))
-    assert re.match(r"a_g and a_p are hardly told apart \(correlation -0\.990\): read them together; people at", line)
+    (line,) = warnings({**content, "covariance": covariance})
+    assert line.startswith("a_g and a_p are strongly correlated (-0.990): the data barely separate them; read them")
     covariance[1] = covariance[:, 1] = np.nan
-    assert warnings(replace(found, covariance=covariance)) == []
+    assert warnings({**content, "covariance": covariance}) == []
+
+
+def test_an_uncertain_parameter_is_named(evidence):
+    content = {**content_of(evidence), "participants": ["p01"]}
+    content["parameters"][2]["standard_error"] = 0.51 * abs(content["parameters"][2]["value"])
+    assert warnings(content) == ["a_p is uncertain: its standard error exceeds half of its value"]
 
 
 def test_few_participants_are_too_few_for_errors_by_participant(evidence):
-    found = fit(evidence, Reward.named({}))
-    (line,) = warnings(found)
-    assert line.startswith("errors by participant come from 4 participants: rough below 10")
-    assert warnings(replace(found, participants=1)) == []
+    content = content_of(evidence)
+    (line,) = warnings(content)
+    assert line.startswith("errors by participant come from 4 participants: they are rough below 10")
+    assert warnings({**content, "participants": ["p01"]}) == []
 
 
 def test_demonstrations_of_the_robot_alone_are_told(navirl, files):
@@ -279,7 +292,7 @@ def test_demonstrations_of_the_robot_alone_are_told(navirl, files):
     some = [replace(one, corrected=number > 1) for number, one in enumerate(demonstrations)]
     write_json(Path("some.json"), "demonstrations", demonstrations_document(some, [], {}), force=False)
     told = navirl("fit", "some.json", "-o", "a.json").stderr
-    assert "navirl: 2 of 8 demonstrations show no intervention: they teach what the robot does by itself" in told
+    assert "navirl: 2 of 8 demonstrations show no intervention: the reward also learns what the robot does" in told
     for options in (("--only-corrected",), ("--condition", "force")):
         assert "no intervention" not in navirl("fit", "some.json", "-o", "b.json", "--force", *options).stderr
 
@@ -305,7 +318,7 @@ def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monke
 def test_a_prior_must_be_a_maximum_and_should_be_of_others(navirl, files):
     told = navirl("fit", files / "one.json", "-o", "r.json", "--prior", files / "reward.json").stderr
     assert "navirl: the prior was learnt from p01/1, p01/2" in told
-    assert "what they say counts twice" in told
+    assert "these demonstrations count twice" in told
     document = json.loads((files / "reward.json").read_text())
     Path("early.json").write_text(json.dumps({**document, "status": "stopped early"}))
     told = navirl("fit", files / "one.json", "-o", "s.json", "--prior", "early.json", code=1).stderr
@@ -320,7 +333,7 @@ def test_the_bias_is_taken_off_and_told(navirl, files):
     assert np.array(values_of(found)) + bias == pytest.approx(values_of(plain))
     assert np.abs(bias / values_of(found, "standard_error")).max() < 1
     assert found["log_likelihood"] < plain["log_likelihood"]
-    assert "bias taken off" in text
+    assert "bias subtracted" in text
     assert values_of(plain, "bias_subtracted") == [None] * 4
     for options in (("--prior", files / "reward.json"), ("--steps", "contact"), ("--profile", "c0")):
         told = navirl("fit", files / "demos.json", "-o", "s.json", "--correct-bias", *options, code=2).stderr
@@ -354,5 +367,7 @@ def test_plot_profile_without_a_profile_is_refused(navirl, files, tmp_path):
 
 def test_an_interval_that_reaches_a_bound_does_not_go_beyond(files):
     # The deviation's weight cannot be positive.
-    assert "profile           a_g: 95 % interval -" in (files / "full.txt").read_text()
-    assert "to inf" not in (files / "full.txt").read_text()
+    rows = [line.split() for line in (files / "full.txt").read_text().splitlines()]
+    (shown,) = (row for row in rows if row[:2] == ["a_g", "95"])
+    assert float(shown[2]) < 0.0
+    assert shown[3:] == "- above, up to the parameter's bound 0".split()  # noqa: SIM905

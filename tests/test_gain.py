@@ -162,7 +162,7 @@ def test_the_gain_of_the_simulated_robot_is_found_in_the_sample_logs():
 def test_extract_prints_and_writes_the_gain(navirl, tmp_path):
     one, two = write_run(tmp_path / "a.mcap", PUSHED), write_run(tmp_path / "b.mcap", replace(PUSHED, sensor_yaw=0.4))
     lines = navirl("extract", one, two, "-o", "demos.json", "--gain").stdout.splitlines()
-    assert lines[3:5] == ["", "log     gain m/s/N  standard error  pushes  delay s"]
+    assert lines[3:5] == ["", "log     gain m/s/N  standard error m/s/N  pushes  delay s"]
     assert [line.split()[0] for line in lines[5:]] == ["a.mcap", "b.mcap", "all"]
     assert float(lines[-1].split()[1]) == pytest.approx(K, rel=0.02)
     assert lines[-1].split()[3] == "6"
@@ -192,7 +192,7 @@ def test_the_filter_is_the_users(navirl, tmp_path):
     peaks = []
     for hz in ("0.3", "5"):
         (row,) = json.loads(navirl("extract", log, "-o", f"{hz}.json", "--wrench-filter", hz, "--json").stdout)
-        peaks.append(row["peak N"])
+        peaks.append(row["peak_force_n"])
     assert peaks[0] < 0.9 * peaks[1]
     assert read_json(Path("0.3.json"), "demonstrations")["settings"]["push"]["cutoff_hz"] == 0.3
     assert "--wrench-filter" in navirl("extract", log, "-o", "z.json", "--wrench-filter", "0", code=2).stderr

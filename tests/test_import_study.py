@@ -126,7 +126,7 @@ def test_a_damaged_archive_is_refused(navirl, study):
 def test_extract_takes_the_logs_and_finds_the_published_cells(navirl, study):
     navirl("import-study", "runs/p1", "-o", "logs")
     result = navirl("extract", "logs/p1.mcap", "--no-wrench", "-o", "demos.json")
-    assert "p1.mcap: cells as published with it: 10 of 10 paths" in result.stderr
+    assert "p1.mcap: cells equal to those published with it: 10 of 10 paths" in result.stderr
     demonstrations = json.loads((study / "demos.json").read_text())["demonstrations"]
     assert {one["set"] for one in demonstrations} >= {None, "obstacle course", "obstacle avoidance"}
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from math import inf, nan, pi
 
 import numpy as np
@@ -169,13 +170,19 @@ def test_every_number_comes_back_from_csv(rows):
 @DETERMINISTIC
 @given(st.lists(NUMBERS, min_size=1, max_size=6))
 def test_numbers_of_a_column_have_equally_many_decimals(cells):
-    texts = " ".join(text for text in shown(Column("x"), *cells) if text != "-").replace("±", " ").replace("to", " ")
-    assert len({len(text.partition(".")[2]) for text in texts.split()}) <= 1
+    texts = [text for text in shown(Column("x"), *cells) if text != "-"]
+    numbers = [number for text in texts for number in re.split(" ± | to ", text)]
+    assert len({len(number.partition("e")[0].partition(".")[2]) for number in numbers}) <= 1
+
+
+def test_columns_without_a_value_can_be_left_out():
+    table = Table((Column("a"), Column("b"), Column("c")), ((1, None, "x"), (2, nan, None)), "Caption.")
+    assert written(table.without_empty()) == "Caption.\na  c\n1  x\n2  -"
 
 
 def test_captions_and_notes_stand_around():
     table = Table((Column("a"),), ((1,),), "Of **it**: 50 %.", "Why: `x_y`.")
-    assert written(table) == "Of it: 50 %.\na\n1\nWhy: x_y."
+    assert written(table) == "Of it: 50 %.\na\n1\nWhy: `x_y`."
     assert written(table, Format.MARKDOWN) == "Of **it**: 50 %.\n\n|   a |\n| --: |\n|   1 |\n\nWhy: `x_y`."
     latex = written(table, Format.LATEX)
     assert latex.startswith(r"Of \textbf{it}: 50 \%." + "\n\n" + r"\begin{tabular}{r}")

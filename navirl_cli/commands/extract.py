@@ -1,6 +1,6 @@
 """``navirl extract``: logs to demonstrations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -29,11 +29,13 @@ from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.extract import ExtractSettings, numbered
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.trials import Split
+from navirl_cli.documents.tables import Table
+from navirl_cli.documents.text import to_text
 from navirl_cli.files import check_writable
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.roles.clocks import TimeSource
-from navirl_cli.reports.extraction import gain_table, published_notes, trial_row, trial_table
+from navirl_cli.reports.extraction import gain_table, published_notes, trial_table
 
 
 @click.command()
@@ -167,21 +169,20 @@ def extract(
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in results])
     write_json(output, "demonstrations", document, force=force)
-    _echo([trial_row(demonstration) for demonstration in demonstrations], document, as_json=as_json)
+    _echo(trial_table(demonstrations), document, as_json=as_json)
     notes = [note for result in results for note in result.notes] + published_notes(results)
     for line in merged([*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]):
         say(line)
     finish([*failed, *(line for result in results for line in (*result.damage, *result.skipped))])
 
 
-def _echo(rows: Sequence[dict[str, Any]], document: Mapping[str, Any], *, as_json: bool) -> None:
+def _echo(trials: Table, document: Mapping[str, Any], *, as_json: bool) -> None:
     """The trials, and the gain where it was asked for."""
     if as_json:
+        rows = trials.records()
         echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
     else:
-        echo(trial_table(rows))
-        if document.get("gain"):
-            echo("\n" + gain_table(document["gain"]))
+        echo(to_text([trials, *([gain_table(document["gain"])] if document.get("gain") else [])]))
 
 
 def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:

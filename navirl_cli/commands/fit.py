@@ -28,6 +28,7 @@ from navirl_cli.commands.shared import (
 from navirl_cli.commands.usage import as_options
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.timing import steps_in_contact
+from navirl_cli.documents.text import to_text
 from navirl_cli.errors import DemonstrationError, NavirlError, RewardError
 from navirl_cli.files import check_writable
 from navirl_cli.irl.bias import corrected
@@ -170,8 +171,8 @@ def fit(
     if as_json:
         echo_json(document)
     else:
-        echo(report(found, analyses))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(found)):
+        echo(to_text(report(document)))
+    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
         say(line)
     finish(lost)
 

@@ -81,6 +81,11 @@ def runs_of(text: str) -> tuple[Run, ...]:
     return tuple(run for run in runs if run.text)
 
 
+def text_of(text: str) -> str:
+    """A text for a terminal: code keeps its backticks, strong text is plain."""
+    return "".join(f"`{run.text}`" if run.mark is Mark.CODE else run.text for run in runs_of(text))
+
+
 def plain_of(text: str) -> str:
     """A text without its marks, as for a window's title."""
     return "".join(run.text for run in runs_of(text))

@@ -7,13 +7,13 @@ import csv
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import floor, isfinite, isnan, log10
 from numbers import Integral, Real
 from typing import TypeAlias
 
-from navirl_cli.documents.inline import latex_of, markdown_of, plain_of
+from navirl_cli.documents.inline import latex_of, markdown_of, text_of
 
 #: The minus sign of typeset text; plain text, CSV and Markdown use the ASCII hyphen.
 MINUS = "\N{MINUS SIGN}"
@@ -115,6 +115,12 @@ class Table:
     def column(self, j: int) -> tuple[Cell, ...]:
         """The cells of a column."""
         return tuple(row[j] for row in self.rows)
+
+    def without_empty(self) -> "Table":
+        """The same without the columns in which all values are missing."""
+        kept = [j for j in range(len(self.columns)) if not all(map(is_missing, self.column(j)))]
+        rows = tuple(tuple(row[j] for j in kept) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[j] for j in kept), rows=rows)
 
     def shown(self, minus: str = "-") -> list[tuple[str, ...]]:
         """The rows as texts for a reader.
@@ -274,9 +280,9 @@ def _csv(table: Table) -> str:
 def _plain_text(table: Table) -> str:
     """Columns aligned by their widest entry: numbers to the right, texts to the left."""
     header = [column.title for column in table.columns]
-    rows = [[plain_of(text) for text in row] for row in (header, *table.shown())]
+    rows = [[text_of(text) for text in row] for row in (header, *table.shown())]
     lines = ["  ".join(row).rstrip() for row in _aligned(rows, table.numeric)]
-    return "\n".join(filter(None, (plain_of(table.caption), *lines, plain_of(table.note))))
+    return "\n".join(filter(None, (text_of(table.caption), *lines, text_of(table.note))))
 
 
 def _markdown(table: Table) -> str:

@@ -1,36 +1,52 @@
-"""The tables of ``navirl extract``."""
+"""What ``navirl extract`` reports: its trials, its gains, and the cells that were published with a log."""
 
-from collections.abc import Iterable, Sequence
-from math import degrees, hypot
+from collections.abc import Iterable, Mapping, Sequence
+from math import hypot, pi
 from typing import Any
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction
 from navirl_cli.demos.lines import path_length_m
-from navirl_cli.documents.tables import text_table
+from navirl_cli.documents.tables import Cell, Column, Table
 
-#: Columns of the table, and how their numbers are written.
-FORMATS = {
-    "trial": "",
-    "condition": "",
-    "cycle": "d",
-    "set": "",
-    "duration s": ".1f",
-    "length m": ".2f",
-    "cells": "d",
-    "contacts": "d",
-    "contact %": ".0f",
-    "peak N": ".1f",
-    "impulse Ns": ".1f",
-    "direction deg": ".0f",
-}
+_TRIAL = (
+    Column("trial"),
+    Column("condition"),
+    Column("cycle"),
+    Column("set"),
+    Column("duration_s", "duration s", decimals=1),
+    Column("length_m", "length m", decimals=2),
+    Column("cells"),
+    Column("contacts"),
+    Column("contact_share", "contact %", decimals=0, scale=100),
+    Column("peak_force_n", "peak N", decimals=1),
+    Column("impulse_n_s", "impulse N s", decimals=1),
+    Column("direction_rad", "direction deg", decimals=0, scale=180 / pi),
+)
+_GAIN = (
+    Column("log"),
+    Column("gain_m_s_n", "gain m/s/N"),
+    Column("standard_error_m_s_n", "standard error m/s/N", significant=2),
+    Column("pushes"),
+    Column("delay_s", "delay s", decimals=2),
+)
 
 
-def trial_row(d: Demonstration) -> dict[str, Any]:
-    """One trial of the table, by its columns."""
+def trial_table(demonstrations: Sequence[Demonstration]) -> Table:
+    """One row a trial; direction and peak force are those of its strongest contact."""
+    notes = []
+    if any(one.laid_out_m_s is not None for one in demonstrations):
+        notes.append("No duration: positions came without times.")
+    if any(one.contacts is None for one in demonstrations):
+        notes.append("No contacts: forces were not read.")
+    return Table(_TRIAL, tuple(map(_trial, demonstrations)), note=" ".join(notes))
+
+
+def _trial(d: Demonstration) -> tuple[Cell, ...]:
+    """A row of the table of trials."""
     contacts = d.contacts or ()
     strongest = max(contacts, key=lambda contact: hypot(*contact.impulse_n_s), default=None)
-    values = (
+    return (
         d.id,
         d.condition.value,
         d.cycle,
@@ -39,46 +55,35 @@ def trial_row(d: Demonstration) -> dict[str, Any]:
         path_length_m(d.xy_m),
         len(d.cells),
         None if d.contacts is None else len(d.contacts),
-        None if d.contact_s is None else 100 * d.contact_s / d.duration_s,
+        None if d.contact_s is None else d.contact_s / d.duration_s,
         max((contact.peak_force_n for contact in contacts), default=None),
         None if d.contacts is None else sum(hypot(*contact.impulse_n_s) for contact in contacts),
-        None if strongest is None else degrees(strongest.direction_rad),
+        None if strongest is None else strongest.direction_rad,
     )
-    return dict(zip(FORMATS, values, strict=True))
 
 
-def trial_table(rows: Sequence[dict[str, Any]]) -> str:
-    """The trials, one a line."""
-    return text_table(list(FORMATS), [[_shown(name, row[name]) for name in FORMATS] for row in rows])
+def gain_table(gain: Mapping[str, Any]) -> Table:
+    """The gain of each log, and of all together where there are several.
 
-
-def _shown(name: str, value: Any) -> str:
-    return "-" if value is None else format(value, FORMATS[name])
-
-
-#: Columns of the table of gains: field, heading and how its numbers are written.
-GAIN_FORMATS = (
-    ("m_s_per_n", "gain m/s/N", ".4g"),
-    ("standard_error", "standard error", ".2g"),
-    ("pushes", "pushes", "d"),
-    ("delay_s", "delay s", ".2f"),
-)
-
-
-def gain_table(gain: dict[str, Any]) -> str:
-    """The gain of each log, and of all together where there are several."""
+    Args:
+        gain: As in a demonstrations file.
+    """
     lines = [*gain["logs"], *([{"log": "all", **gain}] if len(gain["logs"]) > 1 else [])]
-    rows = [[line["log"], *(format(line[field], style) for field, _, style in GAIN_FORMATS)] for line in lines]
-    return text_table(["log", *(heading for _, heading, _ in GAIN_FORMATS)], rows)
+    return Table(
+        _GAIN,
+        tuple(
+            (line["log"], line["m_s_per_n"], line["standard_error"], line["pushes"], line["delay_s"]) for line in lines
+        ),
+    )
 
 
 def published_notes(results: Iterable[Extraction]) -> list[str]:
     """How many paths have the cells that were published with their log."""
     notes = []
     for result in results:
-        other = [name for name, same in result.published.items() if not same]
+        different = [name for name, same in result.published.items() if not same]
         if result.published:
-            told = f"; not those of {', '.join(other)}" if other else ""
-            total = len(result.published)
-            notes.append(f"{result.log}: cells as published with it: {total - len(other)} of {total} paths{told}")
+            listed = f"; different: {', '.join(different)}" if different else ""
+            count = f"{len(result.published) - len(different)} of {len(result.published)} paths"
+            notes.append(f"{result.log}: cells equal to those published with it: {count}{listed}")
     return notes

@@ -1,92 +1,215 @@
-"""What ``navirl fit`` prints: the parameters, how sure they are, how well they are told apart, what they foretell."""
+"""What ``navirl fit`` reports: parameters, their uncertainty and correlation, the likelihood, further analyses.
 
-from collections.abc import Sequence
-from math import isfinite
+All of it is read from the content of a reward file, so that the page of ``navirl report`` shows the same tables.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite, nan
+from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.rewards import Analyses, LearntReward
+from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.documents.tables import text_table
-from navirl_cli.irl.bootstrap import Bootstrap
-from navirl_cli.irl.fit import Fit
-from navirl_cli.irl.profile import Profile
+from navirl_cli.documents.document import Block, Bullets, Paragraph
+from navirl_cli.documents.tables import Cell, Column, Interval, Table
+from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.validation import Validation
+from navirl_cli.irl.uncertainty import condition_number, correlation
 
 #: Participants below which their scatter says little (Cameron and Miller 2015, J. Human Resources 50:317).
 FEW = 10
 #: Correlation beyond which two parameters are to be read together.
 TIED = 0.95
+#: Half the width of a 95 % interval of a normal estimate, in standard errors.
+_WIDTH = 1.96
 
 
-def report(found: Fit, analyses: Analyses) -> str:
-    """The fit and what was asked of it besides, as text."""
-    names = [parameter.name for parameter in found.reward.parameters]
-    gain = found.log_likelihood - found.log_likelihood_uniform
-    parts = [
-        _parameters(found, analyses.bootstrap),
-        _correlations(found),
-        "\n".join(
-            (
-                f"demonstrations    {found.demonstrations} of {found.participants} participant"
-                + ("s" if found.participants > 1 else "")
-                + f", {found.steps} steps",
-                f"log-likelihood    {found.log_likelihood:.4f} nats, {found.log_likelihood / found.steps:.4f} per step",
-                f"  at the start    {found.log_likelihood_initial:.4f}",
-                f"  uniform policy  {found.log_likelihood_uniform:.4f} ({gain / found.steps:.4f} per step worse)",
-                f"iterations        {found.iterations} ({found.evaluations} evaluations from all starts)",
-                f"status            {found.status.value}: {found.status.advice}",
-            )
-        ),
+def report(content: Mapping[str, Any]) -> list[Block]:
+    """The fit and what was asked of it besides.
+
+    Args:
+        content: Of the reward file.
+    """
+    status = Status(content["status"])
+    return [
+        parameter_table(content),
+        meanings_of_parameters(),
+        *correlation_table(content),
+        likelihood_table(content),
+        Paragraph(counts(content)),
+        Paragraph(f"Status: **{status.value}**: {status.advice}."),
+        *bootstrap_line(content),
+        *profile_table(content),
+        *validation_tables(content),
     ]
-    if analyses.bootstrap is not None:
-        parts.append(_bootstrap(analyses.bootstrap, names))
-    bounds = {parameter.name: (parameter.lower, parameter.upper) for parameter in found.reward.parameters}
-    parts.extend(_profile(profile, *bounds[profile.name]) for profile in analyses.profiles)
-    if analyses.validation is not None:
-        parts.append(_validation(analyses.validation))
-    return "\n\n".join(part for part in parts if part)
 
 
-def _parameters(found: Fit, bootstrap: Bootstrap | None) -> str:
-    """One row a parameter."""
-    header, columns = ["parameter", "value", "std. error"], []
-    if found.clustered_errors is not None:
-        header.append("by participant")
-        columns.append([_figure(error) for error in found.clustered_errors])
-    if found.bias is not None:
-        header.append("bias taken off")
-        columns.append([f"{bias:.4f}" for bias in found.bias])
-    if bootstrap is not None:
-        header.append("bootstrap 95 %")
-        columns.append([f"{low:.4g} to {high:.4g}" if isfinite(low) else "-" for low, high in bootstrap.interval().T])
+def parameter_table(content: Mapping[str, Any]) -> Table:
+    """Estimates with errors and intervals, one row a parameter."""
+    bootstrap = content["bootstrap"]
+    drawn = zip(bootstrap["lower"], bootstrap["upper"], strict=True) if bootstrap else None
+    columns = (
+        Column("parameter"),
+        Column("value", decimals=4),
+        Column("standard_error", "std. error", decimals=4),
+        Column("standard_error_clustered", "by participant", decimals=4),
+        Column("interval", "95 % interval", decimals=4),
+        Column("bias_subtracted", "bias subtracted", decimals=4),
+        Column("bootstrap", "bootstrap 95 %", decimals=4),
+        Column("unit"),
+        Column("state"),
+    )
+    rows = tuple(_parameter(one, next(drawn) if drawn else (None, None)) for one in content["parameters"])
+    clustered = any(one["standard_error_clustered"] is not None for one in content["parameters"])
+    note = "By participant: standard errors from the scatter between participants." if clustered else ""
+    return Table(columns, rows, note=note).without_empty()
+
+
+def _parameter(one: Mapping[str, Any], drawn: tuple[float | None, float | None]) -> tuple[Cell, ...]:
+    value, error = one["value"], one["standard_error"]
+    return (
+        one["name"],
+        value,
+        error,
+        one["standard_error_clustered"],
+        None if error is None else Interval(value - _WIDTH * error, value + _WIDTH * error),
+        one["bias_subtracted"],
+        _interval(*drawn),
+        one["unit"] or "1",
+        "on its bound" if one["on_bound"] else "identified" if one["identified"] else "not identified",
+    )
+
+
+def _interval(lower: float | None, upper: float | None) -> Interval | None:
+    return None if lower is None or upper is None else Interval(lower, upper)
+
+
+def meanings_of_parameters() -> Bullets:
+    """What each parameter is."""
+    return Bullets(tuple(f"{one.name}: {one.meaning}" for one in Reward.named({}).parameters))
+
+
+def correlation_table(content: Mapping[str, Any]) -> list[Block]:
+    """Correlations of the estimates; nothing where fewer than two have a standard error."""
+    covariance = np.array(content["covariance"], dtype=float)
+    matrix = correlation(covariance)
+    names = [one["name"] for one in content["parameters"]]
+    known = [j for j in range(len(names)) if isfinite(matrix[j, j])]
+    if len(known) < 2:
+        return []
+    columns = (Column("correlation"), *(Column(names[j], decimals=2) for j in known))
+    rows = tuple((names[i], *(float(matrix[i, j]) for j in known)) for i in known)
+    note = f"Condition number of the correlations: {condition_number(covariance):.3g}."
+    return [Table(columns, rows, note=note)]
+
+
+def likelihood_table(content: Mapping[str, Any]) -> Table:
+    """How likely the demonstrated steps are under the fit and under what it is compared with."""
+    columns = (
+        Column("policy"),
+        Column("log_likelihood", "log-likelihood nats", decimals=4),
+        Column("log_likelihood_per_step", "nats per step", decimals=4),
+    )
+    policies = (
+        ("fitted", content["log_likelihood"]),
+        ("at the start of the search", content["log_likelihood_initial"]),
+        ("all moves equally likely", content["log_likelihood_uniform"]),
+    )
+    return Table(columns, tuple((name, nats, nats / content["steps"]) for name, nats in policies))
+
+
+def counts(content: Mapping[str, Any]) -> str:
+    """How much the fit comes from, and what it took, in a line."""
+    data = f"{len(content['demonstrations'])} demonstrations of {people(content)}, {content['steps']} steps"
+    return f"{data}; {content['iterations']} iterations, {content['evaluations']} evaluations from all starts."
+
+
+def people(content: Mapping[str, Any]) -> str:
+    """From how many participants the reward was learnt."""
+    count = len(content["participants"])
+    return f"{count} participant{'' if count == 1 else 's'}"
+
+
+def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
+    """How many draws there were."""
+    found = content["bootstrap"]
+    if found is None:
+        return []
+    count = len(found["theta"])
+    lost = [f"{found['failed']} without a fit"] if found["failed"] else []
+    lost += [f"{found['stopped_early']} stopped early"] if found["stopped_early"] else []
+    lost += [
+        f"{one['name']} identified in {identified} of them"
+        for one, identified in zip(content["parameters"], found["told"], strict=True)
+        if identified < count
+    ]
+    return [Paragraph(", ".join([f"Bootstrap: {count} draws of participants (seed {found['seed']})", *lost]) + ".")]
+
+
+def profile_table(content: Mapping[str, Any]) -> list[Block]:
+    """Intervals from the profile likelihoods that were followed."""
+    bounds = {one.name: (one.lower, one.upper) for one in Reward.named({}).parameters}
+    columns = (
+        Column("profile"),
+        Column("level", "level %", decimals=0, scale=100),
+        Column("lower", decimals=4),
+        Column("upper", decimals=4),
+        Column("open ends"),
+    )
     rows = []
-    for j, parameter in enumerate(found.reward.parameters):
-        remark = parameter.meaning if found.identified[j] else "not identified: its value means nothing"
-        rows.append(
-            (
-                parameter.name,
-                f"{found.reward.theta[j]:.4f}",
-                _figure(found.standard_errors[j]),
-                *(column[j] for column in columns),
-                parameter.unit or "1",
-                "on its bound" if found.on_bound[j] else remark,
-            )
-        )
-    return text_table((*header, "unit", "meaning"), rows)
+    for one in content["profiles"]:
+        lower, upper = bounds[one["parameter"]]
+        values = one["values"]
+        ends = (_end("below", one["lower"], values[0], lower), _end("above", one["upper"], values[-1], upper))
+        rows.append((one["parameter"], one["level"], one["lower"], one["upper"], ", ".join(filter(None, ends))))
+    return [Table(columns, tuple(rows)).without_empty()] if rows else []
 
 
-def _correlations(found: Fit) -> str:
-    """Correlations of the estimates, below the diagonal."""
-    names = [parameter.name for parameter in found.reward.parameters]
-    matrix = found.correlation
-    told = [j for j in range(len(names)) if isfinite(matrix[j, j])]
-    if len(told) < 2:
+def _end(side: str, edge: float | None, last: float, bound: float) -> str:
+    """Why an interval has no end on one side; empty where it has one."""
+    if edge is not None:
         return ""
-    rows = [(names[j], *(_figure(matrix[j, i], 2) if i < j else "" for i in told[:-1])) for j in told[1:]]
-    table = text_table(("correlation", *(names[i] for i in told[:-1])), rows)
-    return f"{table}\ncondition number  {found.condition_number:.3g} of the correlations"
+    return f"{side}, up to the parameter's bound {bound:g}" if last == bound else f"{side}, up to {last:.4g} at least"
+
+
+def validation_tables(content: Mapping[str, Any]) -> list[Block]:
+    """Held-out log-likelihoods by model, and how far features are from those expected."""
+    found = content["cross_validation"]
+    if found is None:
+        return []
+    names, steps, features = found["left_out"], found["steps"], found["features"]
+    likelihoods = tuple(
+        (model, one["per_step"], *_per_step(one["log_likelihood"], steps)) for model, one in found["models"].items()
+    )
+    mismatches = tuple(
+        (name, _root_mean_square(one["mismatch_standard_errors"], one["identified"]), *one["mismatch_standard_errors"])
+        for name, one in features.items()
+    )
+    notes = [
+        f"Without {participant}: {status}"
+        + "".join(f", {name} not identified" for name, one in features.items() if not one["identified"][j])
+        for j, (participant, status) in enumerate(zip(names, found["statuses"], strict=True))
+        if status != Status.CONVERGED
+    ]
+    return [
+        Table((Column("model"), *(Column(name, decimals=4) for name in ("all", *names))), likelihoods, _HELD_OUT),
+        Table((Column("feature of"), *(Column(name, decimals=2) for name in ("rms", *names))), mismatches, _MISMATCH),
+        *([Bullets(tuple(notes))] if notes else []),
+    ]
+
+
+_HELD_OUT = "Log-likelihood per step of each participant under a fit to all others, nats."
+_MISMATCH = "Demonstrated minus expected features of each participant, |f - E f|, in standard errors."
+
+
+def _per_step(log_likelihoods: Sequence[float | None], steps: Sequence[int]) -> list[float | None]:
+    return [None if value is None else value / n for value, n in zip(log_likelihoods, steps, strict=True)]
+
+
+def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -> float:
+    known = np.array(values, dtype=float)[np.array(counted, dtype=bool)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else nan
 
 
 def remarks(chosen: list[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
@@ -95,78 +218,43 @@ def remarks(chosen: list[Demonstration], earlier: LearntReward | None, *, chosen
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(
-            f"{alone} of {len(chosen)} demonstrations show no intervention: they teach what the robot does by itself; "
-            "leave them out with --only-corrected, or choose with --condition"
+            f"{alone} of {len(chosen)} demonstrations show no intervention: the reward also learns what the "
+            "robot does by itself; leave them out with `only_corrected`, or choose with `condition`"
         )
     twice = [] if earlier is None else sorted({d.id for d in chosen} & set(earlier.demonstrations))
     if twice:
-        lines.append(f"the prior was learnt from {', '.join(twice)} too: what they say counts twice")
+        lines.append(f"the prior was learnt from {', '.join(twice)} too: these demonstrations count twice")
     return lines
 
 
-def warnings(found: Fit) -> list[str]:
-    """What a user should know before trusting the numbers."""
-    names = [parameter.name for parameter in found.reward.parameters]
-    matrix = found.correlation
+def warnings(content: Mapping[str, Any]) -> list[str]:
+    """What a user should know before trusting the numbers.
+
+    Args:
+        content: Of the reward file.
+    """
+    parameters = content["parameters"]
+    names = [one["name"] for one in parameters]
+    matrix = correlation(np.array(content["covariance"], dtype=float))
     lines = [
-        f"{names[i]} and {names[j]} are hardly told apart (correlation {matrix[i, j]:.3f}): read them together; "
-        "people at other distances, or more detours, would part them"
+        f"{names[i]} and {names[j]} are strongly correlated ({matrix[i, j]:.3f}): the data barely separate them; read "
+        "them together; people at other distances, or more detours, would separate them"
         for j in range(len(names))
         for i in range(j)
         if abs(matrix[i, j]) > TIED
     ]
-    if 1 < found.participants < FEW:
+    lines += [
+        f"{one['name']} is uncertain: its standard error exceeds half of its value"
+        for one in parameters
+        if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
+    ]
+    count = len(content["participants"])
+    if 1 < count < FEW:
         lines.append(
-            f"errors by participant come from {found.participants} participants: rough below {FEW}, and too small "
-            "where there are no more participants than parameters"
+            f"errors by participant come from {count} participants: they are rough below {FEW}, and too small where "
+            "there are no more participants than parameters"
         )
-    if found.status is not Status.CONVERGED:
-        lines.append(f"{found.status.value}: {found.status.advice}")
+    status = Status(content["status"])
+    if status is not Status.CONVERGED:
+        lines.append(f"{status.value}: {status.advice}")
     return lines
-
-
-def _bootstrap(found: Bootstrap, names: Sequence[str]) -> str:
-    """How many draws there were."""
-    lost = f", {found.failed} without a fit" if found.failed else ""
-    early = f", {found.stopped_early} stopped early" if found.stopped_early else ""
-    count = len(found.theta)
-    untold = "".join(f", {n} told in {told} of them" for n, told in zip(names, found.told, strict=True) if told < count)
-    return f"bootstrap         {count} draws of participants (seed {found.seed}){lost}{early}{untold}"
-
-
-def _profile(found: Profile, lower: float, upper: float) -> str:
-    """The interval; an open end reaches to the parameter's bound or has none."""
-    ends = [
-        f"{end:.4f}" if end is not None else f"{bound:g} (its bound)" if last == bound else "open"
-        for end, last, bound in ((found.lower, found.values[0], lower), (found.upper, found.values[-1], upper))
-    ]
-    return f"profile           {found.name}: {100 * found.level:.0f} % interval {ends[0]} to {ends[1]}"
-
-
-def _validation(found: Validation) -> str:
-    """Held-out log-likelihoods by model, and the features."""
-    models = [
-        (model, f"{found.per_step(model):.4f}", *(f"{v:.4f}" for v in values / found.steps))
-        for model, values in found.log_likelihoods.items()
-    ]
-    likelihoods = text_table(("log-likelihood per step, left out", "all", *found.participants), models)
-    told = np.where(found.identified, found.mismatch**2, 0.0)
-    with np.errstate(invalid="ignore"):
-        root = np.sqrt(told.sum(axis=0) / found.identified.sum(axis=0))
-    features = [
-        (parameter.name, _figure(root[j], 2), *(_figure(v, 2) for v in row))
-        for j, (parameter, row) in enumerate(zip(found.parameters, found.mismatch.T, strict=True))
-    ]
-    matches = text_table(("|f_demo - E f|, std. errors, left out", "rms", *found.participants), features)
-    notes = [
-        f"without {participant}: {status.value}"
-        + "".join(f", {p.name} not told" for p, told in zip(found.parameters, identified, strict=True) if not told)
-        for participant, status, identified in zip(found.participants, found.statuses, found.identified, strict=True)
-        if status is not Status.CONVERGED
-    ]
-    return "\n\n".join((likelihoods, matches, *(["\n".join(notes)] if notes else [])))
-
-
-def _figure(value: float, digits: int = 4) -> str:
-    """A number, or a dash where there is none."""
-    return f"{value:.{digits}f}" if isfinite(value) else "-"

@@ -11,31 +11,45 @@ from navirl_cli import __version__
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
-from navirl_cli.documents.tables import Table
+from navirl_cli.documents.tables import Column, Table
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, center_distance_m
 from navirl_cli.evaluation.ranks import Rank
-from navirl_cli.irl.status import Status
 from navirl_cli.reports.evaluation import group_table, uniform_line
-from navirl_cli.reports.extraction import FORMATS, trial_row
+from navirl_cli.reports.extraction import trial_table
+from navirl_cli.reports.fit import (
+    bootstrap_line,
+    correlation_table,
+    likelihood_table,
+    meanings_of_parameters,
+    parameter_table,
+    people,
+    profile_table,
+    validation_tables,
+    warnings,
+)
 
-#: Half the width of a 95 % interval of a normal estimate, in standard errors.
-_WIDTH = 1.96
+_FORMULA = (
+    "The reward of a step from s to s': r = c0 |s - s'| + a_g d(s)^2 + the sum over people p of "
+    "a_p exp(-sigma_p |s - s_p|^2), where d is the distance from the nominal path and s_p the position of p."
+)
 _CAPTIONS = {
-    "paths": "All driven paths by condition; thicker where the person pushed.",
-    "policy": "Where the learnt policy leads, as expected visits of every cell, and the reward of every cell.",
-    "properties": "Driven and learnt paths by group: mean and standard deviation.",
-    "profile": "Profile likelihoods: how sure a parameter is, and how lopsided.",
+    "paths": "Driven paths by condition; the line is thicker where the person pushed.",
+    "policy": "Expected visits of every cell under the learnt policy, and the reward of every cell.",
+    "properties": "Properties of driven and learnt paths by group: mean and standard deviation.",
+    "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: Beside the paper's three, where they are known.
 _METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
+#: Rank below which a demonstration is reported as rare.
+_RARE = 0.01
 
 
 def report_of(
     demonstrations: Sequence[Demonstration],
     learnt: LearntReward,
-    document: Mapping[str, Any],
+    content: Mapping[str, Any],
     result: Comparison,
     ranks: Sequence[Rank],
     figures: Mapping[str, Path],
@@ -47,100 +61,63 @@ def report_of(
     Args:
         demonstrations: All.
         learnt: The reward.
-        document: Its file.
+        content: Of its file.
         result: Metrics.
         ranks: Of the demonstrations among the policy's paths.
         figures: Files by name.
         made_from: Files and hashes.
         seed: Of the intervals.
     """
-    everyone = _people(len({one.participant for one in demonstrations}))
-    fit = f"learnt from {len(learnt.demonstrations)} of them, of {_people(len(document['participants']))}"
     notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
     blocks: list[Block] = [
-        Paragraph(f"{len(demonstrations)} demonstrations of {everyone}, and a navigation reward {fit}."),
-        Heading("What was learnt"),
-        _parameters(document),
-        Paragraph(
-            f"Log-likelihood {document['log_likelihood']:.3f} nats over {document['steps']} steps, "
-            f"{document['log_likelihood'] / document['steps']:.4f} per step; equally likely moves have "
-            f"{document['log_likelihood_uniform'] / document['steps']:.4f}. Status: **{learnt.status.value}**, "
-            f"{learnt.status.advice}."
-        ),
-        Heading("What it means"),
-        Bullets(tuple(map(_sentence, _said(demonstrations, learnt, seed)))),
-        *_warnings(learnt, document, ranks),
-        Heading("Where it leads"),
-        *_pictures(figures, "policy", "profile"),
-        Heading("Paths"),
+        Paragraph(_summary(demonstrations, learnt, content)),
+        *_warnings(content, ranks),
+        Heading("Parameters"),
+        Paragraph(_FORMULA),
+        parameter_table(content),
+        meanings_of_parameters(),
+        *bootstrap_line(content),
+        *profile_table(content),
+        *_pictures(figures, "profile"),
+        *correlation_table(content),
+        likelihood_table(content),
+        Heading("Meaning of the parameters in metres"),
+        Bullets(tuple(map(_sentence, _in_metres(demonstrations, learnt, seed)))),
+        Heading("Learnt policy"),
+        *_pictures(figures, "policy"),
+        Heading("Path metrics"),
         group_table(result, _METRICS),
         *_pictures(figures, "properties", "paths"),
-        Heading("How typical the demonstrations are"),
-        Paragraph(f"R{uniform_line(ranks)[1:]}. Those it was learnt from are counted too."),
-        _ranks(learnt, ranks),
-        *_held_out(document),
-        Heading("What the logs held"),
-        _trials(demonstrations),
+        Heading("Ranks of the demonstrations"),
+        Paragraph(f"R{uniform_line(ranks)[1:]}. Demonstrations that the reward was learnt from are included."),
+        _rank_table(learnt, ranks),
+        Heading("Prediction of participants left out"),
+        *(validation_tables(content) or [Paragraph("Not computed; fit with `cross_validate` participant.")]),
+        Heading("Trials"),
+        trial_table(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
-        Heading("Made from"),
-        Table.of_texts(
-            ("file", "SHA-256"), tuple((one["file"], one["sha256"]) for one in made_from), "Files and their hashes."
-        ),
+        Heading("Sources"),
+        Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
 
 
-def _said(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:
-    """What the reward means where people were passed."""
+def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any]) -> str:
+    """What the page is about, and how the fit ended."""
+    everyone = people({"participants": {one.participant for one in demonstrations}})
+    return (
+        f"{len(demonstrations)} demonstrations of {everyone}, and a navigation reward learnt from "
+        f"{len(learnt.demonstrations)} of them, of {people(content)}. "
+        f"The fit ended with the status **{learnt.status.value}**: {learnt.status.advice}."
+    )
+
+
+def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:
+    """What the reward means at the distance at which people were passed."""
     seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
     seen = [distance for distance in seen if isfinite(distance)]
     passed = float(np.mean(seen)) if seen else float("nan")
     return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, np.random.default_rng(seed))
-
-
-def _ranks(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
-    """Rank by demonstration."""
-    rows = [
-        (
-            one.id,
-            one.group,
-            f"{one.log_likelihood:.2f}",
-            f"{one.rank:.3f}",
-            "yes" if one.id in learnt.demonstrations else "no",
-        )
-        for one in ranks
-    ]
-    header = ("demonstration", "group", "log-likelihood", "rank", "learnt from")
-    return Table.of_texts(header, tuple(rows), "Share of the policy's paths that are less likely.")
-
-
-def _people(count: int) -> str:
-    return f"{count} participant{'' if count == 1 else 's'}"
-
-
-def _parameters(document: Mapping[str, Any]) -> Table:
-    """Estimates with errors and intervals."""
-    rows = []
-    for one in document["parameters"]:
-        value, error = one["value"], one["standard_error"]
-        interval = "-" if error is None else f"{value - _WIDTH * error:.4g} to {value + _WIDTH * error:.4g}"
-        clustered = one["standard_error_clustered"]
-        state = "on its bound" if one["on_bound"] else "" if one["identified"] else "not identified"
-        rows.append(
-            (
-                one["name"],
-                f"{value:.4g}",
-                one["unit"] or "1",
-                "-" if error is None else f"{error:.2g}",
-                interval,
-                "-" if clustered is None else f"{clustered:.2g}",
-                state or "identified",
-            )
-        )
-    header = ("parameter", "value", "unit", "std. error", "95 % interval", "std. error by participant", "state")
-    return Table.of_texts(
-        header, tuple(rows), "r(s, a) = c0 |s - s'| + a_g d(s)^2 + sum over people of a_p exp(-sigma_p |s - s_p|^2)."
-    )
 
 
 def _sentence(one: Meaning) -> str:
@@ -149,43 +126,26 @@ def _sentence(one: Meaning) -> str:
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
-def _held_out(document: Mapping[str, Any]) -> list[Block]:
-    """How well each participant is foretold from the others, where that was asked for."""
-    found = document["cross_validation"]
-    if found is None:
-        return [
-            Paragraph("How well it foretells people that it has not seen: fit with `--cross-validate participant`.")
-        ]
-    rows = tuple(
-        (model, *("-" if value is None else f"{value:.3f}" for value in (one["per_step"], *one["log_likelihood"])))
-        for model, one in found["models"].items()
+def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
+    """Rank by demonstration."""
+    columns = (
+        Column("demonstration"),
+        Column("group"),
+        Column("log_likelihood", "log-likelihood nats", decimals=2),
+        Column("rank", decimals=3),
+        Column("learnt_from", "learnt from"),
     )
-    header = ("model", "per step", *found["left_out"])
-    return [Table.of_texts(header, rows, "Log-likelihood of each participant under a fit of the others, nats.")]
+    rows = tuple((one.id, one.group, one.log_likelihood, one.rank, one.id in learnt.demonstrations) for one in ranks)
+    return Table(columns, rows, note="Rank: share of the policy's paths that are less likely than the demonstration.")
 
 
-def _warnings(learnt: LearntReward, document: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
-    """What should make a reader careful."""
-    lines = []
-    if learnt.status is not Status.CONVERGED:
-        lines.append(f"The fit is {learnt.status.value}: {learnt.status.advice}.")
-    for one in document["parameters"]:
-        error = one["standard_error"]
-        if error is not None and error > abs(one["value"]) / 2:
-            lines.append(f"{one['name']} rests on little: its standard error exceeds half of its value.")
-    if len(document["participants"]) < 10:
-        lines.append("Errors by participant are rough below ten participants.")
-    if any(one.rank < 0.01 for one in ranks):
-        odd = ", ".join(one.id for one in ranks if one.rank < 0.01)
-        lines.append(f"The policy hardly ever takes paths like those of {odd}.")
+def _warnings(content: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
+    """What a reader should know before trusting the numbers."""
+    lines = [f"{line[0].upper()}{line[1:]}." if line[:2].islower() else f"{line}." for line in warnings(content)]
+    rare = ", ".join(one.id for one in ranks if one.rank < _RARE)
+    if rare:
+        lines.append(f"The policy rarely takes paths like those of {rare}.")
     return [Heading("Warnings"), Bullets(tuple(lines))] if lines else []
-
-
-def _trials(demonstrations: Sequence[Demonstration]) -> Table:
-    """The table of extract."""
-    rows = [trial_row(one) for one in demonstrations]
-    shown = [["-" if row[name] is None else format(row[name], FORMATS[name]) for name in FORMATS] for row in rows]
-    return Table.of_texts(tuple(FORMATS), tuple(tuple(row) for row in shown), "Trials as extracted.")
 
 
 def _pictures(figures: Mapping[str, Path], *names: str) -> list[Block]:
