@@ -1,5 +1,6 @@
 """Figures as files: formats, refusals, the same bytes, nothing left behind; and no display."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -144,6 +145,30 @@ def test_no_setting_of_the_process_changes(tmp_path):
     before = dict(mpl.rcParams)
     save_figure(figure(), tmp_path / "a.svg")
     assert dict(mpl.rcParams) == before
+
+
+#: What figures take from the rooms that solve: types, names, and what an axis needs. Nothing that computes a policy.
+TAKEN = {
+    "navirl_cli.irl.profile": {"Profile", "fall_at"},
+    "navirl_cli.irl.scene": {"Scene"},
+    "navirl_cli.irl.solved": {"SolvedScene"},
+    "navirl_cli.irl.terms.term": {"Parameter"},
+    "navirl_cli.evaluation.compare": {"DRIVEN", "LEARNT", "ON_GRID", "PERSON_RADIUS_M"},
+    "navirl_cli.evaluation.groups": {"GroupMetrics", "by_group", "group_of"},
+    "navirl_cli.evaluation.metrics": {"PAPER_METRICS", "Metric", "Values"},
+    "navirl_cli.study.pipeline": {"Study"},
+    "navirl_cli.study.questionnaire": {"Shares"},
+    "navirl_cli.study.unseen": {"PooledPolicy"},
+}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_figures_draw_and_solve_nothing(module):
+    tree = ast.parse((Path(navirl_cli.figures.__file__).parent / f"{module}.py").read_text())
+    rooms = ("navirl_cli.irl", "navirl_cli.evaluation", "navirl_cli.study")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(rooms):
+            assert {alias.name for alias in node.names} <= TAKEN.get(node.module, set())
 
 
 def test_no_display_is_needed():
