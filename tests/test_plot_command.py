@@ -1,6 +1,8 @@
 """``navirl plot`` as it is called: options of every figure, and refusals in one line."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from test_figures import demonstration
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.rewards import reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands.plot import FIGURES, plot
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures import sheet
 from navirl_cli.irl.evidence import evidence_of
@@ -53,6 +56,25 @@ def entries(figure):
     """Texts of all legends."""
     legends = [panel.get_legend() for panel in figure.axes if panel.get_legend()] + figure.legends
     return [text.get_text() for legend in legends for text in legend.get_texts()]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_help_lists_each_figure_as_it_describes_itself(navirl, name):
+    summary = FIGURES[name][1]
+    assert plot.get_command(None, name).help.splitlines()[0] == summary
+    assert f"{name} {summary}" in " ".join(navirl("plot", "--help").stdout.split())
+
+
+def test_the_help_imports_nothing_heavy():
+    code = "import sys; from navirl_cli.cli import cli; cli(sys.argv[1:], standalone_mode=False); print(*sys.modules)"
+    words = [sys.executable, "-c", code, "plot", "--help"]
+    modules = set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
+    assert "navirl_cli.commands.plot" in modules
+    assert not {"numpy", "scipy", "matplotlib", "jsonschema"} & modules
+
+
+def test_an_unknown_figure_is_answered_with_the_known_ones(navirl):
+    assert "No such command 'heat'; commands are paths, policy, reward" in navirl("plot", "heat", code=2).stderr
 
 
 def test_a_figure_for_a_screen_has_twice_the_pixels_in_the_dark(navirl, files):

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.commands.plot.maps import trial_of
-from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_option
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
 from navirl_cli.commands.shared import FilePath, demonstrations_in, demos_argument, progress_bar, seed_option
 from navirl_cli.errors import DemonstrationError
 
@@ -32,7 +31,10 @@ _GROUP = "A condition with cycle and set, as in the tables of evaluate, e.g. 'fo
 )
 @seed_option
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
-    """Ranks of demonstrations among the policy's own paths by log-likelihood: uniform where the policy is right."""
+    """Draw how demonstrations rank among paths of the policy.
+
+    Ranks are by log-likelihood. They are uniform if the policy is right.
+    """
     import numpy as np
 
     from navirl_cli.evaluation.ranks import ranks_of, uniformity
@@ -58,7 +60,11 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
 def compare(
     page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
 ) -> None:
-    """Rewards beside each other in the scene of one trial (policy and state reward), or paths of groups."""
+    """Draw several rewards, or several groups, side by side.
+
+    Give two or more --reward, for policy and state reward in the scene of one trial; or two or more --group, for
+    their driven paths.
+    """
     if min(len(rewards), len(groups)) > 0 or max(len(rewards), len(groups)) < 2:
         raise click.UsageError("compare needs two or more --reward, or two or more --group")
     if groups and trial is not None:

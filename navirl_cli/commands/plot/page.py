@@ -1,15 +1,19 @@
 """What every command of ``navirl plot`` takes: where to write, how wide, for paper or for a screen."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from navirl_cli.commands.shared import FilePath, Function, force_option, output_option
+from navirl_cli.errors import DemonstrationError
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is not imported before a figure is drawn.
 STYLES = ("paper", "screen", "dark")
@@ -94,3 +98,15 @@ def page_options(function: Function) -> Function:
 crop_option = click.option("--crop", is_flag=True, help="Show no more of the map than what surrounds the paths.")
 trial_option = click.option("--trial", help="Draw this trial, e.g. p01/3; the first one by default.")
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
+
+
+def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "Demonstration":
+    """The demonstration that was asked for, or the first.
+
+    Raises:
+        DemonstrationError: None is called so.
+    """
+    for one in demonstrations:
+        if trial in {None, one.id}:
+            return one
+    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
