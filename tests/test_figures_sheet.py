@@ -171,14 +171,17 @@ def test_figures_draw_and_solve_nothing(module):
             assert {alias.name for alias in node.names} <= TAKEN.get(node.module, set())
 
 
-def test_no_display_is_needed():
+def test_neither_a_display_nor_what_writes_other_formats_is_loaded(tmp_path):
     imports = "; ".join(f"import navirl_cli.figures.{name}" for name in MODULES)
     program = (
-        f"import sys; {imports}\n"
-        "from navirl_cli.figures.sheet import new_figure, trim_height\n"
-        "trim_height(new_figure()[0])\n"
-        "sys.exit('matplotlib.pyplot' in sys.modules)"
+        f"import sys; from pathlib import Path; {imports}\n"
+        "from navirl_cli.figures.sheet import new_figure, save_figure\n"
+        f"save_figure(new_figure()[0], Path({str(tmp_path / 'a.png')!r}))\n"
+        "print(*sys.modules)"
     )
     top = Path(navirl_cli.figures.__file__).parents[2]
-    done = subprocess.run([sys.executable, "-c", program], cwd=top, check=False)
-    assert done.returncode == 0
+    done = subprocess.run([sys.executable, "-c", program], cwd=top, check=True, capture_output=True, text=True)
+    modules = set(done.stdout.split())
+    assert "matplotlib.backends.backend_agg" in modules
+    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "matplotlib.backends.backend_svg"} & modules
+    assert not {"scipy.stats", "scipy.interpolate", "scipy.ndimage", "scipy.signal", "shapely"} & modules

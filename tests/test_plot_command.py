@@ -138,7 +138,7 @@ def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
 
 def test_the_styles_and_formats_offered_are_those_that_there_are():
     assert list(STYLES) == list(LOOKS)
-    assert list(FORMATS) == list(sheet.CANVASES)
+    assert list(FORMATS) == list(sheet.METADATA)
 
 
 @pytest.mark.parametrize(("kind", "label"), [("value", "soft value [nats]"), ("actions", "most likely move")])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is not imported before a figure is drawn.
 STYLES = ("paper", "screen", "dark")
-#: Endings of files; keys of :data:`navirl_cli.figures.sheet.CANVASES`.
+#: Endings of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
 FORMATS = ("png", "pdf", "svg")
 
 
