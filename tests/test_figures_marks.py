@@ -5,9 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from test_figures import demonstration, legend_texts, one_axes, room
-from test_figures_cells import PUBLISHED, scene, scene_and_visits
-from test_figures_rows import assert_nothing_touches
+from figure_checks import assert_nothing_touches, legend_texts
+from figure_factory import PUBLISHED, demonstration, one_axes, room, scene, scene_and_visits
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures.cells import LIKELY_VISITS, draw_policy, draw_reward, likely_window

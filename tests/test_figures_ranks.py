@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches, legend_texts
+from figure_factory import one_axes
 from scipy.stats import kstest
-from test_figures import legend_texts, one_axes
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ranks import draw_ranks

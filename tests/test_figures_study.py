@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches, labelled, layouts
+from figure_factory import demonstration, room
 from matplotlib.colors import to_hex
-from test_figures import demonstration, labelled, room
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.errors import DemonstrationError, SceneError
@@ -21,8 +21,8 @@ from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.solved import SolvedScene
 
-WIDTHS = pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
 FORCE_S, JOYSTICK_S = (41.0, 35.5, 38.0, 50.0, 36.0), (25.0, 25.0, 26.0, 27.0)
+LONG_NAMES = {"the joystick in the left hand": FORCE_S, "force": [30], "joystick": [1e4]}
 
 
 def completion(times_s, width_in=COLUMN_IN):
@@ -69,16 +69,18 @@ def test_dots_part_where_they_would_hide_each_other_and_stand_where_they_stood(v
     assert set(drawn.dots[1].get_xdata()) == {1.0}  # nothing is in their way
 
 
-@WIDTHS
 @pytest.mark.parametrize(
-    "times_s",
-    [
-        {"force": FORCE_S},
-        {"force": [31.4]},
-        {"the joystick in the left hand": FORCE_S, "force": [30], "joystick": [1e4]},
-    ],
+    ("width_in", "times_s"),
+    layouts(
+        (COLUMN_IN, LONG_NAMES),
+        (PAGE_IN, {"force": FORCE_S}),
+        (COLUMN_IN, {"force": FORCE_S}),
+        (COLUMN_IN, {"force": [31.4]}),
+        (PAGE_IN, {"force": [31.4]}),
+        (PAGE_IN, LONG_NAMES),
+    ),
 )
-def test_no_two_labels_of_completion_times_touch(times_s, width_in):
+def test_no_two_labels_of_completion_times_touch(width_in, times_s):
     figure, drawn = completion(times_s, width_in)
     assert_nothing_touches(figure)
     assert len(drawn.boxes) == len(times_s)
@@ -153,12 +155,7 @@ def test_all_panels_show_what_the_widest_needs():
 
 @pytest.mark.parametrize(
     ("count", "columns", "width_in"),
-    [
-        (2, 2, COLUMN_IN),
-        (3, 2, PAGE_IN),
-        (4, 2, PAGE_IN),
-        (2, 1, COLUMN_IN),
-    ],
+    layouts((2, 2, COLUMN_IN), (3, 2, PAGE_IN), (4, 2, PAGE_IN), (2, 1, COLUMN_IN)),
 )
 def test_panels_are_of_one_size_and_nothing_in_them_touches(count, columns, width_in):
     panels = [(f"{title} with the participants' hands", members) for title, members in PANELS[:count]]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_factory import demonstration
 from PIL import Image
-from test_figures import demonstration
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.rewards import reward_document
