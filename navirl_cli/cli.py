@@ -1,12 +1,12 @@
 """The command line: subcommands are loaded when called, and known trouble becomes a message here and only here."""
 
 import sys
-from importlib import import_module
 from typing import Any
 
 import click
 
 from navirl_cli import __version__
+from navirl_cli.commands.lazy import LazyGroup
 from navirl_cli.commands.usage import as_options
 from navirl_cli.errors import NavirlError
 
@@ -25,33 +25,8 @@ COMMANDS = {
 }
 
 
-class LazyGroup(click.Group):
-    """A group whose commands are imported when they are called."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Names in the order of the work."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Import a command."""
-        if cmd_name not in COMMANDS:
-            return None
-        name = cmd_name.replace("-", "_")
-        command: click.Command = getattr(import_module(f"navirl_cli.commands.{name}"), name)
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Suggest near names for an unknown one."""
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            ctx.fail(f"No such command {args[0]!r}; commands are {', '.join(COMMANDS)}.")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """List the commands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+class _Root(LazyGroup):
+    """The group of all commands, and the boundary for known trouble."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; expected errors and Ctrl-C become one line on stderr and an exit code."""
@@ -67,7 +42,11 @@ class LazyGroup(click.Group):
         return ctx.exit(code)
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=_Root,
+    known={name: (f"navirl_cli.commands.{name.replace('-', '_')}", summary) for name, summary in COMMANDS.items()},
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="navirl")
 @click.option("--debug", is_flag=True, help="Show the traceback of known trouble too.")
 def cli(debug: bool) -> None:

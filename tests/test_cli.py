@@ -237,6 +237,7 @@ def test_notes_go_to_stderr(navirl, tmp_path):
         ("evaluate", "demos.json", "--metrics", "length_m,speed"),
         ("evaluate", "demos.json", "--ranks"),
         ("plot", "nothing", "demos.json"),
+        ("plot", "paths", "demos.json", "-o", "a.gif"),
         ("extract", "a.mcap", "-o", "x.json", "--robot-radius", "nan"),
         ("extract", "a.mcap", "-o", "x.json", "--contact-force", "inf"),
         ("extract", "a.mcap", "-o", "x.json", "--resolution", "1e-9"),
@@ -359,7 +360,6 @@ def test_plot_draws_every_kind(navirl, work):
 def test_plot_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
     demos, reward = work / "demos.json", ("--reward", work / "reward.json")
     for words, message in (
-        (("paths", demos, "-o", "a.gif"), "a.gif: a figure is saved as .png, .pdf or .svg"),
         (("policy", demos, *reward, "-o", "a.png", "--trial", "p9/9"), "no trial is called 'p9/9'; there are p01/1"),
         (("policy", demos, "--reward", demos, "-o", "a.png"), "expected navirl reward"),
     ):

@@ -30,7 +30,7 @@ def test_options_in_the_readme_exist(command):
     text = (ROOT / "README.md").read_text()
     section = re.search(rf"^### `navirl {command}\b.*?(?=^##)", text, re.MULTILINE | re.DOTALL)
     assert section
-    kinds = tuple(plot.commands) if command == "plot" else ()
+    kinds = tuple(plot.known) if command == "plot" else ()
     known = help_of(command) + " ".join(help_of(command, kind) for kind in kinds)
     for option in set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", section.group())):
         assert option in known, option

@@ -2,63 +2,16 @@
 
 import numpy as np
 import pytest
+from figure_checks import labelled, legend_texts
+from figure_factory import demonstration, one_axes, room
 from matplotlib.colors import to_hex
 
-from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
-from navirl_cli.demos.grid import Grid
+from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ground import window_around
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.sheet import new_figure, trim_height
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
-
-
-def room(rows=40, columns=80, origin_m=(-4.0, -2.0)):
-    occupied = np.zeros((rows, columns), dtype=bool)
-    occupied[:4] = occupied[-4:] = True
-    occupied[:, :4] = occupied[:, -4:] = True
-    return Grid(occupied, 0.1, origin_m)
-
-
-def demonstration(condition=Condition.FORCE, cycle=None, aside_m=0.5, contacts=(), grid=None, people_m=((0.0, 0.1),)):
-    """A path from (-3, 0) to (3, 0) along an arc, at 0.6 m/s."""
-    t = np.linspace(0.0, 10.0, 101)
-    x = -3.0 + 0.6 * t
-    xy = np.stack([x, 0.05 + aside_m * np.cos(x * np.pi / 6)], axis=1)
-    grid = room() if grid is None else grid
-    columns = np.arange(10, 70)
-    cells = np.stack([columns, np.full(60, 20)], axis=1)
-    return Demonstration(
-        id=f"{condition}-{cycle}-{aside_m}",
-        participant="p01",
-        condition=condition,
-        corrected=True,
-        cycle=cycle,
-        start_ns=0,
-        t_s=t,
-        xy_m=xy,
-        yaw_rad=np.zeros(101),
-        force_n=None,
-        contacts=tuple(Contact(start, end, 9.0, (0.0, 3.0)) for start, end in contacts),
-        goal_m=(3.0, 0.05),
-        people_m=np.array(people_m, dtype=float).reshape(-1, 2),
-        robot_radius_m=0.3,
-        grid=grid,
-        cells=cells,
-    )
-
-
-def one_axes(width_in=COLUMN_IN):
-    return new_figure(width_in)[1][0]
-
-
-def legend_texts(axes):
-    return [text.get_text() for text in axes.get_legend().get_texts()]
-
-
-def labelled(axes, label):
-    (line,) = [line for line in axes.lines if line.get_label() == label]
-    return line
 
 
 def test_every_path_is_drawn_where_it_was_driven_in_the_colour_of_its_group():

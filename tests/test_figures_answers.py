@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches, layouts
 from matplotlib.colors import to_hex
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.answers import draw_answers, height_for
@@ -14,6 +14,9 @@ from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, level_colours
 from navirl_cli.study.questionnaire import Shares
 
 LONG = "I felt safe while the robot passed me and kept the distance that I had taught to it before."
+
+
+REPLAYS = ["replay of the learnt policy", "replay of the joystick", "obstacle avoidance"]
 
 
 def share(counts, question="Was it easy?", modality="force"):
@@ -47,7 +50,7 @@ def test_an_even_number_of_levels_has_no_middle():
     np.testing.assert_allclose(spans(drawn, 0), [(-75, -50), (-50, 0), (0, 25), (25, 25)])
 
 
-@pytest.mark.parametrize("levels", [2, 4, 5, 7])
+@pytest.mark.parametrize("levels", layouts(5, 4, 2, 7))
 def test_levels_have_their_colours_and_the_legend_names_the_ends(levels):
     _, drawn = asked([share([1] * levels)], COLUMN_IN)
     for level, colour in zip(drawn.levels, level_colours(levels), strict=True):
@@ -91,14 +94,16 @@ def test_the_axis_counts_percent_to_both_sides():
     assert labels == ["100", "50", "0", "50", "100"]  # fewer where room is short
 
 
-@pytest.mark.parametrize(("levels", "width_in"), [(5, PAGE_IN), (7, COLUMN_IN)])
 @pytest.mark.parametrize(
-    ("questions", "modalities"),
-    [
-        (["Was it fun?"], [""]),
-        ([LONG, "Fun?", LONG + LONG], ["force", "joystick"]),
-        (["Fun?", LONG], ["replay of the learnt policy", "replay of the joystick", "obstacle avoidance"]),
-    ],
+    ("levels", "width_in", "questions", "modalities"),
+    layouts(
+        (5, PAGE_IN, [LONG, "Fun?", LONG + LONG], ["force", "joystick"]),
+        (7, COLUMN_IN, ["Fun?", LONG], REPLAYS),
+        (5, PAGE_IN, ["Was it fun?"], [""]),
+        (5, PAGE_IN, ["Fun?", LONG], REPLAYS),
+        (7, COLUMN_IN, ["Was it fun?"], [""]),
+        (7, COLUMN_IN, [LONG, "Fun?", LONG + LONG], ["force", "joystick"]),
+    ),
 )
 def test_no_two_texts_touch_and_bars_keep_their_room(questions, modalities, levels, width_in):
     rng = np.random.default_rng(0)

@@ -1,51 +1,17 @@
 """What figures of numbers by cell draw: the propagated policy and the state reward."""
 
-from functools import cache
-
 import numpy as np
 import pytest
+from figure_checks import assert_cells, layouts, legend_texts
+from figure_factory import PUBLISHED, one_axes, scene, scene_and_visits
 from matplotlib.colors import to_rgba
-from test_figures import demonstration, labelled, legend_texts, one_axes
 
-from navirl_cli.figures.cells import LEAST_VISITS, REACH_M, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.cells import LEAST_VISITS, REACH_M, draw_policy, draw_reward
 from navirl_cli.figures.sheet import new_figure, trim_height
 from navirl_cli.figures.style import COLUMN_IN, DPI, PAGE_IN
-from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import Scene, scenes_of
 
-PUBLISHED = Reward((-54.1, -0.87, -4.9, 1.68))
-
-
-def scene(people_m=((0.0, 0.1),)) -> Scene:
-    return scenes_of([demonstration(people_m=people_m)])[0]
-
-
-@cache
-def scene_and_visits():
-    a_scene = scene()
-    return a_scene, visits_in(a_scene)
-
-
-def visits_in(a_scene):
-    return policy_of(PUBLISHED, a_scene).visits_from(a_scene.start)
-
-
-def assert_cells(drawn: DrawnCells, a_scene: Scene, values) -> None:
-    grid = a_scene.lattice.grid
-    image = drawn.image
-    assert tuple(image.get_extent()) == grid.extent_m
-    assert image.origin == "lower"
-    np.testing.assert_array_equal(image.get_array().mask, grid.occupied)
-    columns, rows = a_scene.lattice.cells.T
-    np.testing.assert_array_equal(image.get_array()[rows, columns], values)
-    np.testing.assert_array_equal(drawn.obstacles.get_array().mask, ~grid.occupied)
-    assert image.get_zorder() < drawn.obstacles.get_zorder() < drawn.nominal.get_zorder()
-    np.testing.assert_array_equal(drawn.nominal.get_xydata(), a_scene.nominal_line_m())
-    np.testing.assert_allclose(labelled(drawn.axes, "start").get_xydata(), a_scene.lattice.xy_m[[a_scene.start]])
-    np.testing.assert_allclose(labelled(drawn.axes, "goal").get_xydata(), a_scene.lattice.xy_m[[a_scene.goal]])
-    assert [circle.center for circle in drawn.people] == [tuple(person) for person in a_scene.people_m]
-    assert (drawn.axes.get_xlabel(), drawn.axes.get_ylabel()) == ("x [m]", "y [m]")
+#: A window so flat that its colour bar stands above it.
+FLAT = (-3.5, 3.5, -1.0, 1.0)
 
 
 def test_the_policy_is_drawn_as_visits_on_a_logarithmic_scale():
@@ -159,8 +125,9 @@ def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(valu
     assert entries["person"].get_markeredgewidth() == person.get_linewidth()
 
 
-@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
-@pytest.mark.parametrize("window", [None, (-3.5, 3.5, -1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("width_in", "window"), layouts((COLUMN_IN, None), (PAGE_IN, FLAT), (PAGE_IN, None), (COLUMN_IN, FLAT))
+)
 def test_the_label_of_a_colour_bar_is_no_longer_than_the_bar(width_in, window):
     drawn = draw_reward(one_axes(width_in), scene(), PUBLISHED.by_cell(scene()), window_m=window)
     drawn.axes.figure.set_dpi(DPI)
@@ -187,8 +154,7 @@ def test_a_colour_bar_is_as_high_as_its_map():
 
 
 def test_a_flat_map_has_its_colour_bar_above_under_the_title():
-    window = (-3.5, 3.5, -1.0, 1.0)
-    drawn = draw_policy(one_axes(), *scene_and_visits(), window_m=window, title="policy")
+    drawn = draw_policy(one_axes(), *scene_and_visits(), window_m=FLAT, title="policy")
     figure = drawn.axes.figure
     figure.draw_without_rendering()
     of_map, of_label = drawn.axes.get_window_extent(), drawn.colour_bar.ax.xaxis.label.get_window_extent()

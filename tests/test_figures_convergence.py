@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_figures_rows import assert_nothing_touches
+from figure_checks import assert_nothing_touches, layouts
 
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.sheet import new_figure
@@ -50,7 +50,7 @@ def test_the_axis_counts_whole_iterations():
     assert all(tick.lstrip("\N{MINUS SIGN}").isdigit() for tick in ticks)
 
 
-@pytest.mark.parametrize(("count", "width_in"), [(1, COLUMN_IN), (2000, COLUMN_IN), (8, PAGE_IN)])
+@pytest.mark.parametrize(("count", "width_in"), layouts((1, COLUMN_IN), (8, PAGE_IN), (2000, COLUMN_IN)))
 def test_no_two_texts_touch(width_in, count):
     figure, _ = drawn_of(count, width_in)
     assert_nothing_touches(figure)

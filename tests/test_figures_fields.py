@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from figure_checks import assert_cells, assert_nothing_touches, legend_texts
+from figure_factory import PUBLISHED, demonstration, one_axes, room, scene
 from matplotlib.colors import to_hex
-from test_figures import demonstration, legend_texts, one_axes, room
-from test_figures_cells import PUBLISHED, assert_cells, scene
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.demos.grid import MOVES
 from navirl_cli.figures.actions import draw_actions

@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches
+from figure_factory import demonstration
 from matplotlib.colors import to_hex
-from test_figures import demonstration
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.demos.demonstration import Condition, Contact
 from navirl_cli.errors import DemonstrationError

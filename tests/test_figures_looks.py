@@ -5,11 +5,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from figure_checks import SIGHTS, lab
+from figure_factory import PUBLISHED, demonstration, one_axes, scene, scene_and_visits
 from matplotlib.colors import to_hex, to_rgb
 from PIL import Image
-from test_figures import demonstration, one_axes
-from test_figures_cells import PUBLISHED, scene, scene_and_visits
-from test_figures_rows import SIGHTS, lab
 
 from navirl_cli.figures.cells import draw_policy, draw_reward
 from navirl_cli.figures.paths import draw_paths

@@ -5,9 +5,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from test_figures import demonstration, legend_texts, one_axes, room
-from test_figures_cells import PUBLISHED, scene, scene_and_visits
-from test_figures_rows import assert_nothing_touches
+from figure_checks import assert_nothing_touches, legend_texts
+from figure_factory import PUBLISHED, demonstration, one_axes, room, scene, scene_and_visits
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures.cells import LIKELY_VISITS, draw_policy, draw_reward, likely_window
@@ -19,6 +18,7 @@ from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.scale import length_m
 from navirl_cli.figures.sheet import new_figure, trim_height
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
+from navirl_cli.irl.solved import SolvedScene
 
 
 @pytest.mark.parametrize(
@@ -219,9 +219,10 @@ def test_panels_can_be_cropped_to_the_paths_of_all():
 def test_one_scene_under_two_rewards_has_one_window_and_one_scale_of_colours():
     a_scene, visits = scene_and_visits()
     _, axes = new_figure(PAGE_IN, panels=4, columns=2)
-    rows = [(name, a_scene, times * visits, times * PUBLISHED.by_cell(a_scene)) for name, times in (("a", 1), ("b", 2))]
+    one = SolvedScene(a_scene, visits, PUBLISHED.by_cell(a_scene))
+    twice = SolvedScene(a_scene, 2 * visits, 2 * one.reward_by_cell)
     window = (-3.5, 3.5, -1.0, 1.5)
-    drawn = draw_policy_and_reward(axes, rows, 0.3, window)
+    drawn = draw_policy_and_reward(axes, [("a", one), ("b", twice)], 0.3, window)
     assert {one.window_m for one in (*drawn.policies, *drawn.rewards)} == {window}
     assert {(*panel.get_xlim(), *panel.get_ylim()) for panel in axes} == {window}
     for kind in (drawn.policies, drawn.rewards):

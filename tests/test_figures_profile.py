@@ -8,6 +8,7 @@ import factories as make
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from figure_checks import layouts
 
 from navirl_cli.artefacts.analyses import profile_document
 from navirl_cli.artefacts.rewards import Analyses, reward_document
@@ -24,9 +25,10 @@ from navirl_cli.irl.reward import Reward
 
 FALL = fall_at(0.95)
 UNITS = {"c0": "1/m", "a_g": "1/m^2", "sigma_p": "1/m^2"}
-ORDERS = ["common", "wordy", "wordy, reversed"]
+ORDERS = ["wordy", "common", "wordy, reversed"]
 #: How many profiles have room, and where.
-ROOM = [(1, COLUMN_IN), (2, COLUMN_IN), (1, PAGE_IN), (2, PAGE_IN), (3, PAGE_IN), (4, PAGE_IN)]
+ROOM = [(4, PAGE_IN), (2, COLUMN_IN), (1, COLUMN_IN), (1, PAGE_IN), (2, PAGE_IN), (3, PAGE_IN)]
+EVERY = layouts(*((order, *room) for order in ORDERS for room in ROOM))
 
 
 def parabola(best=2.0, error=0.5, name="sigma_p", level=0.95):
@@ -171,8 +173,7 @@ def test_a_flat_profile_is_refused():
         drawn(flat)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("count", "width_in"), ROOM)
+@pytest.mark.parametrize(("order", "count", "width_in"), EVERY)
 def test_no_text_is_drawn_over_another_or_cut(order, count, width_in):
     figure = laid_out(order, count, width_in)
     assert len(figure.axes) == count
@@ -189,7 +190,7 @@ def test_no_text_is_drawn_over_another_or_cut(order, count, width_in):
         assert figure.bbox.y0 <= one.y0 < one.y1 <= figure.bbox.y1
 
 
-@pytest.mark.parametrize(("count", "width_in"), ROOM)
+@pytest.mark.parametrize(("count", "width_in"), layouts(*ROOM))
 def test_panels_are_as_large_as_each_other_and_low_enough_for_a_paper(count, width_in):
     figure = laid_out("common", count, width_in)
     inches = [axes.bbox.size / figure.dpi for axes in figure.axes]
@@ -212,7 +213,7 @@ def test_titles_beside_each_other_have_two_lines():
     assert opened.get_title() == "$\\sigma_p$ = 0.934\n(0.385 to open)"
 
 
-@pytest.mark.parametrize(("count", "width_in"), [case for case in ROOM if case[0] > 1])
+@pytest.mark.parametrize(("count", "width_in"), layouts(*(case for case in ROOM if case[0] > 1)))
 def test_only_the_first_panel_has_the_height_written_out(count, width_in):
     first, *others = laid_out("common", count, width_in).axes
     assert first.get_ylabel() == "relative\nlog-likelihood [nats]"
@@ -241,8 +242,7 @@ def test_panels_of_different_levels_keep_their_own_ticks():
     assert other.get_ylim() != first.get_ylim()
 
 
-@pytest.mark.parametrize(("count", "width_in"), ROOM)
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("order", "count", "width_in"), EVERY)
 def test_ticks_are_few(order, count, width_in):
     most = 4 if width_in / count < 2.2 else 6
     for axes in laid_out(order, count, width_in).axes:
@@ -302,7 +302,7 @@ def plot(tmp_path, content):
     return run
 
 
-@pytest.mark.parametrize("level", [1e-4, 0.5, 0.95, 0.9999])
+@pytest.mark.parametrize("level", layouts(1e-4, 0.9999, 0.5, 0.95))
 def test_levels_that_can_be_drawn_are(plot, level):
     assert plot([replace(parabola(), level=level)]).exit_code == 0
 

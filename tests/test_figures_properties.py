@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from figure_checks import layouts
 from matplotlib.colors import to_hex
 
 from navirl_cli.errors import DemonstrationError
@@ -13,6 +14,10 @@ from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures.properties import PropertyBar, bars_of, draw_properties, height_for
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of
+
+#: Every mean in either width.
+WIDTHS = 2 * [COLUMN_IN, PAGE_IN] + 2 * [PAGE_IN, COLUMN_IN]
+MEANS = [(6.7, 0.6, 2.1), (9.4, 0.95, 0.3), (11.8, 1.3, 4.9), (24.0, -0.15, 7.9)]
 
 
 def values(three):
@@ -95,8 +100,7 @@ def test_labels_of_narrow_panels_break_once():
     ]
 
 
-@pytest.mark.parametrize("mean", [(6.7, 0.6, 2.1), (9.4, 0.95, 0.3), (11.8, 1.3, 4.9), (24.0, -0.15, 7.9)])
-@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
+@pytest.mark.parametrize(("width_in", "mean"), layouts(*zip(WIDTHS, 2 * MEANS, strict=True)))
 def test_an_axis_has_three_ticks_at_least(mean, width_in):
     _, drawn = properties([bar(mean=mean, std=(0.2, 0.1, 0.1))], width_in)
     for axes in drawn.axes:
@@ -145,8 +149,7 @@ def test_negative_distances_stay_on_the_paper():
     assert high > 0.0
 
 
-@pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
-@pytest.mark.parametrize("rows", [1, 20])
+@pytest.mark.parametrize(("width_in", "rows"), layouts((COLUMN_IN, 20), (PAGE_IN, 1), (COLUMN_IN, 1), (PAGE_IN, 20)))
 def test_no_two_labels_touch(width_in, rows):
     bars = [bar(f"force, cycle {n}: driven, on the grid of the map", count=10 * n) for n in range(rows)]
     assert_nothing_touches(*properties(bars, width_in))

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches, legend_texts
+from figure_factory import one_axes
 from scipy.stats import kstest
-from test_figures import legend_texts, one_axes
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ranks import draw_ranks
@@ -15,7 +15,7 @@ RANKS = np.array([0.7, 0.1, 0.4, 0.45])
 
 
 def test_steps_rise_by_one_share_at_every_rank():
-    drawn = draw_ranks(one_axes(), RANKS)
+    drawn = draw_ranks(one_axes(), RANKS, 0.5)
     x, y = drawn.steps.get_xydata().T
     assert x.tolist() == [0.0, 0.1, 0.4, 0.45, 0.7, 1.0]
     assert y.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0, 1.0]
@@ -27,16 +27,16 @@ def test_steps_rise_by_one_share_at_every_rank():
 
 def test_the_band_holds_nineteen_of_twenty_sets_of_uniform_ranks_as_a_whole():
     rng = np.random.default_rng(0)
-    reach = draw_ranks(one_axes(), rng.uniform(size=25)).reach
+    reach = draw_ranks(one_axes(), rng.uniform(size=25), 0.5).reach
     within = [kstest(rng.uniform(size=25), "uniform").statistic <= reach for _ in range(500)]
     assert np.mean(within) == pytest.approx(0.95, abs=0.03)
-    assert draw_ranks(one_axes(), rng.uniform(size=25), level=0.5).reach < reach
-    assert draw_ranks(one_axes(), rng.uniform(size=400)).reach < reach / 3
+    assert draw_ranks(one_axes(), rng.uniform(size=25), 0.5, level=0.5).reach < reach
+    assert draw_ranks(one_axes(), rng.uniform(size=400), 0.5).reach < reach / 3
 
 
 @pytest.mark.parametrize("count", [1, 4, 500])
 def test_the_band_lies_a_reach_around_the_diagonal_and_within_0_and_1(count):
-    drawn = draw_ranks(one_axes(), np.linspace(0, 1, count))
+    drawn = draw_ranks(one_axes(), np.linspace(0, 1, count), 0.5)
     (path,) = drawn.band.get_paths()
     for x, y in path.vertices:
         assert y in (pytest.approx(np.clip(x - drawn.reach, 0, 1)), pytest.approx(np.clip(x + drawn.reach, 0, 1)))
@@ -45,23 +45,22 @@ def test_the_band_lies_a_reach_around_the_diagonal_and_within_0_and_1(count):
 
 
 def test_number_and_p_value_are_said():
-    drawn = draw_ranks(one_axes(), RANKS)
-    assert drawn.p_value == pytest.approx(kstest(RANKS, "uniform").pvalue)
-    assert drawn.axes.get_title() == f"n = 4, p = {drawn.p_value:.2g} (Kolmogorov and Smirnov)"
-    crowded = draw_ranks(one_axes(), np.linspace(0.0, 0.1, 50))
-    assert crowded.axes.get_title().startswith("n = 50, p < 0.001 (")
+    drawn = draw_ranks(one_axes(), RANKS, 0.5678)
+    assert drawn.axes.get_title() == "n = 4, p = 0.57 (Kolmogorov and Smirnov)"
+    crowded = draw_ranks(one_axes(), np.linspace(0.0, 0.1, 50), 0.000999)
+    assert crowded.axes.get_title() == "n = 50, p < 0.001 (Kolmogorov and Smirnov)"
 
 
 def test_no_two_texts_touch():
     axes = one_axes(COLUMN_IN)
-    draw_ranks(axes, RANKS)
+    draw_ranks(axes, RANKS, 0.5)
     trim_height(axes.figure)
     assert_nothing_touches(axes.figure)
 
 
 def test_no_ranks_and_numbers_that_are_none_are_refused():
     with pytest.raises(DemonstrationError, match=r"^no ranks to draw$"):
-        draw_ranks(one_axes(), np.array([]))
+        draw_ranks(one_axes(), np.array([]), 0.5)
     for wrong in (-0.1, 1.1, np.nan):
         with pytest.raises(DemonstrationError, match=r"ranks need to be shares from 0 to 1, found "):
-            draw_ranks(one_axes(), np.array([0.5, wrong]))
+            draw_ranks(one_axes(), np.array([0.5, wrong]), 0.5)

@@ -1,41 +1,14 @@
 """What the figures of a study share: rows of panels, one legend below all, and colours that stay apart."""
 
 from itertools import combinations, pairwise
-from unittest.mock import patch
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
+from figure_checks import SIGHTS, lab, layouts
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
 
 from navirl_cli.figures.sheet import common_legend, new_figure, outer_labels, trim_height
-from navirl_cli.figures.style import COLOURS, COLUMN_IN, DPI, PAGE_IN, colour_of, level_colours
-
-
-def drawn_texts(figure):
-    """Every text that is drawn, and where."""
-    drawn = {}
-    draw = Text.draw
-
-    def note(text, renderer):
-        draw(text, renderer)
-        if text.get_visible() and text.get_text().strip():
-            drawn[text] = text.get_window_extent()
-
-    with patch.object(Text, "draw", note):
-        figure.draw_without_rendering()
-    return drawn
-
-
-def assert_nothing_touches(figure):
-    """No two texts overlap, and none leaves the paper."""
-    figure.set_dpi(DPI)
-    drawn = [(text.get_text(), box) for text, box in drawn_texts(figure).items()]
-    assert len(drawn) > 3
-    paper = figure.bbox
-    assert [text for text, box in drawn if box.x0 < 0 or box.x1 > paper.x1 or box.y0 < 0 or box.y1 > paper.y1] == []
-    assert [(one, other) for (one, box), (other, also) in combinations(drawn, 2) if box.overlaps(also)] == []
+from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, colour_of, level_colours
 
 
 def test_panels_stand_row_by_row():
@@ -47,7 +20,7 @@ def test_panels_stand_row_by_row():
 
 @pytest.mark.parametrize(
     ("panels", "columns", "x", "y"),
-    [(4, 2, {2, 3}, {0, 2}), (3, 2, {0, 1, 2}, {0, 2}), (5, 2, {2, 3, 4}, {0, 2, 4}), (3, 1, {2}, {0, 1, 2})],
+    layouts((4, 2, {2, 3}, {0, 2}), (3, 2, {0, 1, 2}, {0, 2}), (5, 2, {2, 3, 4}, {0, 2, 4}), (3, 1, {2}, {0, 1, 2})),
 )
 def test_only_the_outermost_panels_have_labels(panels, columns, x, y):
     figure, axes = new_figure(PAGE_IN, panels=panels, columns=columns)
@@ -102,24 +75,6 @@ def test_rows_of_maps_leave_no_height_empty_and_keep_their_width(panels):
     gaps = [upper[0] - lower[1] for lower, upper in pairwise(edges)]
     assert max(gaps) < 0.1 * figure.dpi
     assert figure.bbox.height - edges[-1][1] < 0.1 * figure.dpi
-
-
-#: Linear RGB as people with colour blindness see it (Machado, Oliveira and Fernandes 2009, severity 1).
-SIGHTS = {
-    "all colours": np.eye(3),
-    "no red": np.array([[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0521]]),
-    "no green": np.array([[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]]),
-    "no blue": np.array([[1.2555, -0.0767, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]]),
-}
-
-
-def lab(colour, sight=SIGHTS["all colours"]):
-    """CIE L*a*b* of a colour in daylight (D65)."""
-    rgb = np.array(to_rgb(colour))
-    linear = np.clip(sight @ np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
-    xyz = np.array([[0.4125, 0.3576, 0.1804], [0.2127, 0.7152, 0.0722], [0.0193, 0.1192, 0.9503]]) @ linear
-    f = np.cbrt(xyz / (0.9505, 1.0, 1.0888))
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
 
 @pytest.mark.parametrize(

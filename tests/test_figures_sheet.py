@@ -1,5 +1,6 @@
 """Figures as files: formats, refusals, the same bytes, nothing left behind; and no display."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -146,14 +147,41 @@ def test_no_setting_of_the_process_changes(tmp_path):
     assert dict(mpl.rcParams) == before
 
 
-def test_no_display_is_needed():
+#: What figures take from the rooms that solve: types, names, and what an axis needs. Nothing that computes a policy.
+TAKEN = {
+    "navirl_cli.irl.profile": {"Profile", "fall_at"},
+    "navirl_cli.irl.scene": {"Scene"},
+    "navirl_cli.irl.solved": {"SolvedScene"},
+    "navirl_cli.irl.terms.term": {"Parameter"},
+    "navirl_cli.evaluation.compare": {"DRIVEN", "LEARNT", "ON_GRID", "PERSON_RADIUS_M"},
+    "navirl_cli.evaluation.groups": {"GroupMetrics", "by_group", "group_of"},
+    "navirl_cli.evaluation.metrics": {"PAPER_METRICS", "Metric", "Values"},
+    "navirl_cli.study.pipeline": {"Study"},
+    "navirl_cli.study.questionnaire": {"Shares"},
+    "navirl_cli.study.unseen": {"PooledPolicy"},
+}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_figures_draw_and_solve_nothing(module):
+    tree = ast.parse((Path(navirl_cli.figures.__file__).parent / f"{module}.py").read_text())
+    rooms = ("navirl_cli.irl", "navirl_cli.evaluation", "navirl_cli.study")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(rooms):
+            assert {alias.name for alias in node.names} <= TAKEN.get(node.module, set())
+
+
+def test_neither_a_display_nor_what_writes_other_formats_is_loaded(tmp_path):
     imports = "; ".join(f"import navirl_cli.figures.{name}" for name in MODULES)
     program = (
-        f"import sys; {imports}\n"
-        "from navirl_cli.figures.sheet import new_figure, trim_height\n"
-        "trim_height(new_figure()[0])\n"
-        "sys.exit('matplotlib.pyplot' in sys.modules)"
+        f"import sys; from pathlib import Path; {imports}\n"
+        "from navirl_cli.figures.sheet import new_figure, save_figure\n"
+        f"save_figure(new_figure()[0], Path({str(tmp_path / 'a.png')!r}))\n"
+        "print(*sys.modules)"
     )
     top = Path(navirl_cli.figures.__file__).parents[2]
-    done = subprocess.run([sys.executable, "-c", program], cwd=top, check=False)
-    assert done.returncode == 0
+    done = subprocess.run([sys.executable, "-c", program], cwd=top, check=True, capture_output=True, text=True)
+    modules = set(done.stdout.split())
+    assert "matplotlib.backends.backend_agg" in modules
+    assert not {"matplotlib.pyplot", "matplotlib.backends.backend_pdf", "matplotlib.backends.backend_svg"} & modules
+    assert not {"scipy.stats", "scipy.interpolate", "scipy.ndimage", "scipy.signal", "shapely"} & modules

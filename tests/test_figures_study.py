@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from figure_checks import assert_nothing_touches, labelled, layouts
+from figure_factory import demonstration, room
 from matplotlib.colors import to_hex
-from test_figures import demonstration, labelled, room
-from test_figures_rows import assert_nothing_touches
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.errors import DemonstrationError, SceneError
@@ -19,9 +19,10 @@ from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.sheet import new_figure, trim_height
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.solved import SolvedScene
 
-WIDTHS = pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
 FORCE_S, JOYSTICK_S = (41.0, 35.5, 38.0, 50.0, 36.0), (25.0, 25.0, 26.0, 27.0)
+LONG_NAMES = {"the joystick in the left hand": FORCE_S, "force": [30], "joystick": [1e4]}
 
 
 def completion(times_s, width_in=COLUMN_IN):
@@ -68,16 +69,18 @@ def test_dots_part_where_they_would_hide_each_other_and_stand_where_they_stood(v
     assert set(drawn.dots[1].get_xdata()) == {1.0}  # nothing is in their way
 
 
-@WIDTHS
 @pytest.mark.parametrize(
-    "times_s",
-    [
-        {"force": FORCE_S},
-        {"force": [31.4]},
-        {"the joystick in the left hand": FORCE_S, "force": [30], "joystick": [1e4]},
-    ],
+    ("width_in", "times_s"),
+    layouts(
+        (COLUMN_IN, LONG_NAMES),
+        (PAGE_IN, {"force": FORCE_S}),
+        (COLUMN_IN, {"force": FORCE_S}),
+        (COLUMN_IN, {"force": [31.4]}),
+        (PAGE_IN, {"force": [31.4]}),
+        (PAGE_IN, LONG_NAMES),
+    ),
 )
-def test_no_two_labels_of_completion_times_touch(times_s, width_in):
+def test_no_two_labels_of_completion_times_touch(width_in, times_s):
     figure, drawn = completion(times_s, width_in)
     assert_nothing_touches(figure)
     assert len(drawn.boxes) == len(times_s)
@@ -152,12 +155,7 @@ def test_all_panels_show_what_the_widest_needs():
 
 @pytest.mark.parametrize(
     ("count", "columns", "width_in"),
-    [
-        (2, 2, COLUMN_IN),
-        (3, 2, PAGE_IN),
-        (4, 2, PAGE_IN),
-        (2, 1, COLUMN_IN),
-    ],
+    layouts((2, 2, COLUMN_IN), (3, 2, PAGE_IN), (4, 2, PAGE_IN), (2, 1, COLUMN_IN)),
 )
 def test_panels_are_of_one_size_and_nothing_in_them_touches(count, columns, width_in):
     panels = [(f"{title} with the participants' hands", members) for title, members in PANELS[:count]]
@@ -184,7 +182,8 @@ def scenes():
     for title, people_m, span in (("one person", [(0.0, 0.1)], 4.0), ("two people", [(-1.0, 0.4), (1.0, -0.3)], 7.0)):
         scene = scenes_of([demonstration(people_m=people_m)])[0]
         x, y = scene.lattice.xy_m.T
-        found.append((title, scene, 0.4 * span * np.exp(-((y / 0.2) ** 2)), -span * np.exp(-(x**2) - y**2)))
+        visits, reward = 0.4 * span * np.exp(-((y / 0.2) ** 2)), -span * np.exp(-(x**2) - y**2)
+        found.append((title, SolvedScene(scene, visits, reward)))
     return found
 
 
@@ -200,10 +199,11 @@ def both_scenes():
 
 def test_every_scene_is_a_row_of_policy_and_reward_over_the_same_window():
     figure, drawn = both_scenes()
-    for (title, scene, visits, reward), policy, of_reward in zip(scenes(), drawn.policies, drawn.rewards, strict=True):
+    for (title, one), policy, of_reward in zip(scenes(), drawn.policies, drawn.rewards, strict=True):
+        scene = one.scene
         columns, rows = scene.lattice.cells.T
-        np.testing.assert_array_equal(policy.image.get_array()[rows, columns], visits)
-        np.testing.assert_array_equal(of_reward.image.get_array()[rows, columns], reward)
+        np.testing.assert_array_equal(policy.image.get_array()[rows, columns], one.visits)
+        np.testing.assert_array_equal(of_reward.image.get_array()[rows, columns], one.reward_by_cell)
         assert policy.window_m == of_reward.window_m
         assert (*of_reward.axes.get_xlim(), *of_reward.axes.get_ylim()) == policy.window_m
         assert (policy.axes.get_title(loc="left"), of_reward.axes.get_title()) == (title, "")
@@ -219,18 +219,18 @@ def test_every_scene_is_a_row_of_policy_and_reward_over_the_same_window():
 def test_a_large_map_is_cropped_alike_in_both_panels_to_where_the_policy_leads():
     scene = scenes_of([demonstration(grid=room(150, 150, (-7.5, -7.5)))])[0]
     visits = np.where(np.hypot(*(scene.lattice.xy_m - (0.0, 3.0)).T) < 0.1, 1.0, 0.0)
-    _, drawn = policies([("large", scene, visits, np.zeros(scene.lattice.size))])
+    _, drawn = policies([("large", SolvedScene(scene, visits, np.zeros(scene.lattice.size)))])
     assert drawn.policies[0].window_m[3] == pytest.approx(4.5, abs=0.11)  # 1.5 m beyond the visits
     assert drawn.rewards[0].window_m == drawn.policies[0].window_m
 
 
 def test_equal_numbers_have_equal_colours_in_all_scenes():
     _, drawn = both_scenes()
-    alone = [draw_reward(new_figure()[1][0], scene, reward) for _, scene, _, reward in scenes()]
+    alone = [draw_reward(new_figure()[1][0], one.scene, one.reward_by_cell) for _, one in scenes()]
     low, high = (limit([one.image.get_clim()[end] for one in alone]) for end, limit in ((0, min), (1, max)))
     assert low < min(alone[0].image.get_clim())
     assert {one.image.get_clim() for one in drawn.rewards} == {(low, high)}
-    most = max(visits.max() for _, _, visits, _ in scenes())
+    most = max(one.visits.max() for _, one in scenes())
     assert {one.image.get_clim() for one in drawn.policies} == {(LEAST_VISITS, most)}
 
 
@@ -255,9 +255,9 @@ def test_one_colour_bar_stands_above_each_column():
 
 
 def test_the_bar_of_rewards_is_pointed_where_a_scene_has_more():
-    title, scene, visits, reward = scenes()[0]
-    far = np.where(np.abs(scene.lattice.xy_m[:, 1]) > 1.45, -100.0, reward)
-    _, drawn = policies([(title, scene, visits, far), scenes()[1]])
+    title, one = scenes()[0]
+    far = np.where(np.abs(one.scene.lattice.xy_m[:, 1]) > 1.45, -100.0, one.reward_by_cell)
+    _, drawn = policies([(title, replace(one, reward_by_cell=far)), scenes()[1]])
     assert drawn.rewards[0].colour_bar.extend == "both"
     assert drawn.rewards[0].image.get_clim()[0] > -10
 
@@ -265,7 +265,7 @@ def test_the_bar_of_rewards_is_pointed_where_a_scene_has_more():
 def test_rows_of_different_places_keep_their_numbers():
     shifted = scenes_of([demonstration(grid=room(44, 80, (-4.0, -2.2)))])[0]
     zeros = np.zeros(shifted.lattice.size)
-    _, drawn = policies([scenes()[0], ("elsewhere", shifted, zeros, zeros)])
+    _, drawn = policies([scenes()[0], ("elsewhere", SolvedScene(shifted, zeros, zeros))])
     assert [one.axes.get_xlabel() for one in (*drawn.policies, *drawn.rewards)] == ["x [m]"] * 4
     assert [one.axes.get_ylabel() for one in (*drawn.policies, *drawn.rewards)] == ["y [m]"] * 2 + [""] * 2
 
@@ -273,8 +273,8 @@ def test_rows_of_different_places_keep_their_numbers():
 @pytest.mark.parametrize(("count", "width_in"), [(1, PAGE_IN), (2, COLUMN_IN)])
 def test_nothing_in_rows_of_policies_touches(count, width_in):
     entries = [
-        (f"{title} beside an obstacle that nobody ever saw in any of the demonstrations", *rest)
-        for title, *rest in scenes()[:count]
+        (f"{title} beside an obstacle that nobody ever saw in any of the demonstrations", one)
+        for title, one in scenes()[:count]
     ]
     figure, drawn = policies(entries, width_in)
     trim_height(figure)
@@ -287,6 +287,6 @@ def test_nothing_in_rows_of_policies_touches(count, width_in):
 def test_scenes_that_cannot_be_drawn_are_refused():
     with pytest.raises(SceneError, match=r"^no scene to draw$"):
         draw_policy_and_reward([], [], 0.3)
-    title, scene, visits, _ = scenes()[0]
+    title, one = scenes()[0]
     with pytest.raises(ValueError, match=r"one number for each of \d+ states is needed, found shape \(3,\)"):
-        policies([(title, scene, visits, np.zeros(3))])
+        policies([(title, replace(one, reward_by_cell=np.zeros(3)))])

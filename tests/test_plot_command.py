@@ -1,19 +1,24 @@
 """``navirl plot`` as it is called: options of every figure, and refusals in one line."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_factory import demonstration
 from PIL import Image
-from test_figures import demonstration
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.rewards import reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands.plot import FIGURES, plot
+from navirl_cli.commands.plot.page import FORMATS, STYLES
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures import sheet
+from navirl_cli.figures.style import LOOKS
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
@@ -53,6 +58,25 @@ def entries(figure):
     """Texts of all legends."""
     legends = [panel.get_legend() for panel in figure.axes if panel.get_legend()] + figure.legends
     return [text.get_text() for legend in legends for text in legend.get_texts()]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_help_lists_each_figure_as_it_describes_itself(navirl, name):
+    summary = FIGURES[name][1]
+    assert plot.get_command(None, name).help.splitlines()[0] == summary
+    assert f"{name} {summary}" in " ".join(navirl("plot", "--help").stdout.split())
+
+
+def test_the_help_imports_nothing_heavy():
+    code = "import sys; from navirl_cli.cli import cli; cli(sys.argv[1:], standalone_mode=False); print(*sys.modules)"
+    words = [sys.executable, "-c", code, "plot", "--help"]
+    modules = set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
+    assert "navirl_cli.commands.plot" in modules
+    assert not {"numpy", "scipy", "matplotlib", "jsonschema"} & modules
+
+
+def test_an_unknown_figure_is_answered_with_the_known_ones(navirl):
+    assert "No such command 'heat'; commands are paths, policy, reward" in navirl("plot", "heat", code=2).stderr
 
 
 def test_a_figure_for_a_screen_has_twice_the_pixels_in_the_dark(navirl, files):
@@ -97,11 +121,13 @@ def test_paths_over_a_map_are_those_of_its_scene_and_repeat_with_the_seed(files,
 
 
 def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
-    for words, message in (
-        (("paths", "none.json", "-o", "a.gif"), "a.gif: a figure is saved as .png, .pdf or .svg"),
-        (("policy", "none.json", "--reward", "none.json", "-o", "no/a.png"), "no/a.png: expected an existing folder"),
-    ):
-        assert message in navirl("plot", *words, code=1).stderr
+    for name in ("a.gif", "a", "a.svg.gz"):
+        message = (
+            f"Invalid value for '-o' / '--output': expected a name that ends in .png, .pdf or .svg, found '{name}'"
+        )
+        assert message in navirl("plot", "paths", "none.json", "-o", name, code=2).stderr
+    words = ("policy", "none.json", "--reward", "none.json", "-o", "no/a.png")
+    assert "no/a.png: expected an existing folder" in navirl("plot", *words, code=1).stderr
     assert (
         "'paper', 'screen', 'dark'"
         in navirl("plot", "paths", files / "demos.json", "-o", "a.png", "--style", "loud", code=2).stderr
@@ -110,11 +136,9 @@ def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
     assert json.loads((files / "reward.json").read_text())["format"] == "navirl/reward"
 
 
-def test_the_styles_offered_are_those_that_there_are():
-    from navirl_cli.commands.plot.page import STYLES
-    from navirl_cli.figures.style import LOOKS
-
+def test_the_styles_and_formats_offered_are_those_that_there_are():
     assert list(STYLES) == list(LOOKS)
+    assert list(FORMATS) == list(sheet.METADATA)
 
 
 @pytest.mark.parametrize(("kind", "label"), [("value", "soft value [nats]"), ("actions", "most likely move")])

@@ -15,12 +15,14 @@ from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.solved import solved
 from navirl_cli.reports.study import remarks
 from navirl_cli.study import learning
 from navirl_cli.study.learning import closeness, is_of_cycle, jobs_of, learn
 from navirl_cli.study.pipeline import PUBLISHED_THETA, study_of
 from navirl_cli.study.questionnaire import Answer
-from navirl_cli.study.unseen import beside_obstacle, two_people
+from navirl_cli.study.unseen import beside_obstacle, pooled_policy, two_people
 
 TRUTH = Reward((-45.0, -0.8, -4.0, 2.0))
 SCENE = make.scene_on(make.open_grid(40, 21), [2, 10], [37, 10], [[2.05, 1.05]])
@@ -203,6 +205,32 @@ def test_the_obstacle_is_grown_and_leaves_a_way():
     assert centres[:, 1].min() - middle[1] > 0.4
     assert np.abs(centres[:, 0] - middle[0]).max() < 0.75 + 0.3 + 0.05
     assert scene.people_m[0] == pytest.approx(middle - (0, 0.5))
+
+
+def test_the_pooled_reward_is_solved_in_the_study_s_scene_and_in_unseen_ones():
+    study = study_of(ALL, {}, 10, 0)
+    found = pooled_policy(study)
+    assert [title for title, _ in found.seen] == ["scene of the study"]
+    scene = scenes_of([study.seconds[0]])[0]
+    expected = solved(study.pooled.second.fit.reward, scene)
+    np.testing.assert_array_equal(found.seen[0][1].visits, expected.visits)
+    assert [len(one.scene.people_m) for _, one in found.unseen] == [2, 1]
+    assert found.notes == ()
+
+
+def test_an_unseen_scene_without_room_is_noted():
+    study = study_of(ALL, {}, 10, 0)
+    wide = tuple(replace(one, robot_radius_m=2.0) for one in study.demonstrations)
+    found = pooled_policy(replace(study, demonstrations=wide))
+    assert [title for title, _ in found.unseen] == ["two people"]
+    (note,) = found.notes
+    assert note.startswith("no unseen scene with person beside a large obstacle: ")
+
+
+def test_without_a_pooled_reward_there_is_no_pooled_policy():
+    study = study_of(ALL, {}, 10, 0)
+    found = pooled_policy(replace(study, pooled=replace(study.pooled, second=None)))
+    assert (found.seen, found.unseen, found.notes) == ((), (), ())
 
 
 def test_a_hallway_without_room_has_no_such_scene():

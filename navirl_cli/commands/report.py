@@ -48,6 +48,8 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     from navirl_cli.evaluation.compare import compare
     from navirl_cli.evaluation.ranks import ranks_of
     from navirl_cli.figures.report import draw_report
+    from navirl_cli.irl.scene import scenes_of
+    from navirl_cli.irl.solved import solved
     from navirl_cli.reports.reward import report_of
 
     if output.suffix != ".html":
@@ -66,8 +68,11 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
         )
     ranks = ranks_of(demonstrations, learnt.reward, samples, rng)
     taught = [one for one in demonstrations if one.id in learnt.demonstrations] or demonstrations
+    shown = taught[0], solved(learnt.reward, scenes_of(taught[:1])[0])
     with TemporaryDirectory() as folder:
-        figures = draw_report(demonstrations, learnt.reward, taught[0], result, learnt.profiles, Path(folder))
+        figures = draw_report(
+            demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
+        )
         made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
         content = report_of(
             demonstrations, learnt, read_json(reward, "reward"), result, ranks, figures, made_from, seed

@@ -82,6 +82,7 @@ def study(
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
+    from navirl_cli.study.unseen import pooled_policy
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
@@ -100,9 +101,11 @@ def study(
         write_json(output / SUMMARY, "study", document, force=force)
         kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
         write_json(output / DEMOS, "demonstrations", kept, force=force)
+        pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
-            drawn, missing = draw_study(found, bars, figures, force=force, progress=update)
-        lost = [*given.lost, *(line for one in (*found.participants, found.pooled) for line in one.trouble), *missing]
+            drawn = draw_study(found, pooled, bars, figures, force=force, progress=update)
+        trouble = [line for one in (*found.participants, found.pooled) for line in one.trouble]
+        lost = [*given.lost, *trouble, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]
         told = Told(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
         _write_report(output, found, told, force=force)

@@ -8,17 +8,16 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 
-from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import SceneError
 from navirl_cli.figures.cells import EXTEND, DrawnCells, draw_policy, draw_reward
 from navirl_cli.figures.ground import Window
 from navirl_cli.figures.marks import merged_handles
 from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
-from navirl_cli.irl.scene import Scene
+from navirl_cli.irl.solved import SolvedScene
 
-#: A scene's title, the scene, its (n,) expected visits and its (n,) reward by cell.
-TitledScene = tuple[str, Scene, FloatArray, FloatArray]
+#: A title, and a scene under a reward.
+TitledScene = tuple[str, SolvedScene]
 #: What the colour bars show.
 VISITS, REWARD = "expected visits", "state reward per step (without cost of way)"
 #: Mean width of a letter, of what stands beside a map, and thickness of a colour bar, inches.
@@ -46,8 +45,7 @@ def draw_policy_and_reward(
 
     Args:
         axes: Two for each scene in rows of two, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
-        scenes: Title, scene, (n,) expected visits by state from its start, and (n,) reward of a step in every state:
-            several scenes under one reward, or one scene under several.
+        scenes: Several scenes under one reward, or one scene under several, with their titles.
         robot_radius_m: Draws the robot at its start to scale, m.
         window_m: Borders of what every map shows, m; None: around each scene's paths.
 
@@ -62,9 +60,9 @@ def draw_policy_and_reward(
         raise SceneError("no scene to draw")
     policies, rewards = [], []
     look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False}
-    for (title, scene, visits, reward), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
-        policies.append(draw_policy(left, scene, visits, window_m=window_m, **look))
-        rewards.append(draw_reward(right, scene, reward, window_m=policies[-1].window_m, **look))
+    for (title, one), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
+        policies.append(draw_policy(left, one.scene, one.visits, window_m=window_m, **look))
+        rewards.append(draw_reward(right, one.scene, one.reward_by_cell, window_m=policies[-1].window_m, **look))
         # The title is the row's: it may reach over the panel on the right, which has none.
         left.set_title(fill(title, int(2 * (panel_width_in(left) - _BESIDE_IN) / _LETTER_IN)), loc="left")
     alike = len({drawn.window_m for drawn in policies}) == 1

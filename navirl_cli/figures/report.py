@@ -1,10 +1,11 @@
 """The figures of a report on one learnt reward, as files."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, Comparison
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID
+from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import properties
 from navirl_cli.figures.paths import draw_paths
@@ -12,17 +13,16 @@ from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.profile import draw_profiles
 from navirl_cli.figures.sheet import new_figure, save_figure
 from navirl_cli.figures.style import PAGE_IN
-from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.solved import SolvedScene
+from navirl_cli.irl.terms.term import Parameter
 
 
 def draw_report(
     demonstrations: Sequence[Demonstration],
-    reward: Reward,
-    shown: Demonstration,
-    result: Comparison,
+    parameters: Sequence[Parameter],
+    shown: tuple[Demonstration, SolvedScene],
+    groups: Iterable[GroupMetrics],
     profiles: Sequence[Profile],
     folder: Path,
 ) -> dict[str, Path]:
@@ -30,9 +30,9 @@ def draw_report(
 
     Args:
         demonstrations: All.
-        reward: What was learnt.
-        shown: Whose scene shows the policy.
-        result: Metrics, as :func:`navirl_cli.evaluation.compare.compare` gives them.
+        parameters: Names and units of what was learnt.
+        shown: The demonstration whose scene shows the policy, and this scene under the learnt reward.
+        groups: Metrics, as :func:`navirl_cli.evaluation.compare.compare` gives them.
         profiles: Profile likelihoods; none where none were followed.
         folder: Where to write .png files.
 
@@ -43,17 +43,16 @@ def draw_report(
     figure, axes = new_figure(PAGE_IN)
     draw_paths(axes[0], demonstrations)
     save_figure(figure, files["paths"])
-    scene = scenes_of([shown])[0]
-    visits = policy_of(reward, scene).visits_from(scene.start)
+    one, scene = shown
     figure, axes = new_figure(PAGE_IN, panels=2, columns=2)
-    draw_policy_and_reward(axes, [(f"scene of {shown.id}", scene, visits, reward.by_cell(scene))], shown.robot_radius_m)
+    draw_policy_and_reward(axes, [(f"scene of {one.id}", scene)], one.robot_radius_m)
     save_figure(figure, files["policy"])
-    bars = properties.bars_of(row for row in result.groups if row.kind in {DRIVEN, ON_GRID, LEARNT})
+    bars = properties.bars_of(row for row in groups if row.kind in {DRIVEN, ON_GRID, LEARNT})
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     save_figure(figure, files["properties"], trim=False)
     if profiles:
-        units = {parameter.name: parameter.unit for parameter in reward.parameters}
+        units = {parameter.name: parameter.unit for parameter in parameters}
         save_figure(draw_profiles(profiles, units, PAGE_IN), files["profile"], trim=False)
     else:
         del files["profile"]

@@ -8,10 +8,6 @@ from types import MappingProxyType
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import FigureCanvasBase
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
@@ -20,11 +16,8 @@ from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, house_style, look
 from navirl_cli.files import check_writable, replacing
 
-#: What writes each format; none of them needs a display.
-CANVASES: Mapping[str, type[FigureCanvasBase]] = MappingProxyType(
-    {"png": FigureCanvasAgg, "pdf": FigureCanvasPdf, "svg": FigureCanvasSVG}
-)
-#: What a file says of itself, by format: nothing that changes from day to day.
+#: By format, what a file states about itself: nothing that changes from day to day. matplotlib loads what writes a
+#: format when it is needed; none of them needs a display.
 METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
     {"png": {}, "pdf": {"CreationDate": None, "ModDate": None}, "svg": {"Date": None}}
 )
@@ -164,7 +157,7 @@ def check_target(path: Path, *, force: bool = False) -> str:
         ArtefactError: The extension is unknown, the folder is missing or cannot be written, or the file exists.
     """
     extension = path.suffix.lower().removeprefix(".")
-    if extension not in CANVASES:
+    if extension not in METADATA:
         found = f'the extension "{path.suffix}"' if path.suffix else "no extension"
         raise ArtefactError(f"{path}: a figure is saved as .png, .pdf or .svg, found {found}; rename the output")
     check_writable(path, force=force)
@@ -190,6 +183,6 @@ def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool =
     if trim:
         trim_height(figure)
     page = BytesIO()
-    CANVASES[extension](figure).print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
+    figure.canvas.print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
     with replacing(path, force=force) as part:
         part.write_bytes(page.getvalue())

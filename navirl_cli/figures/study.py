@@ -8,23 +8,19 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
 from navirl_cli.figures.conditions import draw_path_panels
-from navirl_cli.figures.policies import draw_policy_and_reward
+from navirl_cli.figures.policies import TitledScene, draw_policy_and_reward
 from navirl_cli.figures.sheet import new_figure, save_figure, settle
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
-from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.scene import Scene, scenes_of
 from navirl_cli.parallel import map_in_order
 from navirl_cli.reports.study import FIGURES
 from navirl_cli.study.pipeline import Study
 from navirl_cli.study.questionnaire import Shares
-from navirl_cli.study.unseen import beside_obstacle, two_people
+from navirl_cli.study.unseen import PooledPolicy
 
 #: Formats of every figure: for reports, and for papers.
 FORMATS = ("png", "pdf")
@@ -34,17 +30,19 @@ _Drawn = tuple[Figure, bool]
 
 def draw_study(
     study: Study,
+    pooled: PooledPolicy,
     bars: Sequence[Shares],
     folder: Path,
     *,
     force: bool,
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
-) -> tuple[dict[str, Path], list[str]]:
+) -> dict[str, Path]:
     """Draw whatever the study's data allow.
 
     Args:
         study: The numbers.
+        pooled: Where the pooled reward leads.
         bars: Answers to a questionnaire; none where there is none.
         folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.reports.study.FIGURES`.
         force: Replace existing files; those of an earlier run that have no data now are deleted.
@@ -52,10 +50,9 @@ def draw_study(
         executor: Where to draw; by default local processes.
 
     Returns:
-        The .png file of each figure drawn, and what could not be drawn, in words.
+        The .png file of each figure drawn.
     """
-    notes: list[str] = []
-    wanted = _wanted(study, bars, notes)
+    wanted = _wanted(study, pooled, bars)
     for name in FIGURES if force else ():
         for extension in () if name in wanted else FORMATS:
             (folder / f"{name}.{extension}").unlink(missing_ok=True)
@@ -64,7 +61,7 @@ def draw_study(
         paths[name] = folder / f"{name}.png"
         if progress is not None:
             progress(len(paths), name)
-    return paths, notes
+    return paths
 
 
 def _saved(job: tuple[str, Callable[[], _Drawn]], folder: Path, *, force: bool) -> str:
@@ -77,7 +74,7 @@ def _saved(job: tuple[str, Callable[[], _Drawn]], folder: Path, *, force: bool) 
     return name
 
 
-def _wanted(study: Study, bars: Sequence[Shares], notes: list[str]) -> dict[str, Callable[[], _Drawn]]:
+def _wanted(study: Study, pooled: PooledPolicy, bars: Sequence[Shares]) -> dict[str, Callable[[], _Drawn]]:
     """The figures for which there are data."""
     wanted: dict[str, Callable[[], _Drawn]] = {}
     if study.completion_s:
@@ -93,28 +90,10 @@ def _wanted(study: Study, bars: Sequence[Shares], notes: list[str]) -> dict[str,
         wanted["fig4_answers"] = partial(_answers, bars)
     if study.groups:
         wanted["fig7_properties"] = partial(_properties, study)
-    if study.pooled.second is not None:
-        reward, one = study.pooled.second.fit.reward, study.seconds[0]
-        scene = scenes_of([one])[0]
-        wanted["fig8_pooled"] = partial(_policies, reward, [("scene of the study", scene)], one.robot_radius_m)
-        unseen = _unseen(scene, one, notes)
-        if unseen:
-            wanted["fig9_unseen"] = partial(_policies, reward, unseen, one.robot_radius_m)
+    for name, scenes in (("fig8_pooled", pooled.seen), ("fig9_unseen", pooled.unseen)):
+        if scenes:
+            wanted[name] = partial(_policies, scenes, study.seconds[0].robot_radius_m)
     return wanted
-
-
-def _unseen(scene: Scene, one: Demonstration, notes: list[str]) -> list[tuple[str, Scene]]:
-    """Scenes that nobody demonstrated in, where this hallway has room for them."""
-    found = []
-    for name, make in (
-        ("two people", two_people),
-        ("person beside a large obstacle", partial(beside_obstacle, robot_radius_m=one.robot_radius_m)),
-    ):
-        try:
-            found.append((name, make(scene)))
-        except SceneError as error:
-            notes.append(f"no unseen scene with {name}: {error}")
-    return found
 
 
 def _completion(study: Study) -> _Drawn:
@@ -143,10 +122,7 @@ def _properties(study: Study) -> _Drawn:
     return figure, False
 
 
-def _policies(reward: Reward, scenes: Sequence[tuple[str, Scene]], robot_radius_m: float) -> _Drawn:
-    rows = []
-    for name, scene in scenes:
-        rows.append((name, scene, policy_of(reward, scene).visits_from(scene.start), reward.by_cell(scene)))
-    figure, axes = new_figure(PAGE_IN, panels=2 * len(rows), columns=2)
-    draw_policy_and_reward(axes, rows, robot_radius_m)
+def _policies(scenes: Sequence[TitledScene], robot_radius_m: float) -> _Drawn:
+    figure, axes = new_figure(PAGE_IN, panels=2 * len(scenes), columns=2)
+    draw_policy_and_reward(axes, scenes, robot_radius_m)
     return figure, True

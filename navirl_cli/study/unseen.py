@@ -1,10 +1,16 @@
-"""Scenes that nobody demonstrated in, made from one that somebody did (Fig. 9)."""
+"""Where the pooled reward leads: in the study's scene (Fig. 8), and in scenes without demonstrations (Fig. 9)."""
+
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.grid import Grid
-from navirl_cli.irl.scene import Scene
+from navirl_cli.errors import SceneError
+from navirl_cli.irl.scene import Scene, scenes_of
+from navirl_cli.irl.solved import SolvedScene, solved
+from navirl_cli.study.pipeline import Study
 
 #: Two people stand at these shares of the nominal path, this far to its left and to its right, m.
 SHARES, ASIDE_M = (0.35, 0.65), 0.4
@@ -12,6 +18,37 @@ SHARES, ASIDE_M = (0.35, 0.65), 0.4
 LONG_M, WIDE_M, OFF_M = 1.5, 1.0, 0.8
 #: The person beside it stands this far to the right of the nominal path, m.
 BESIDE_M = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class PooledPolicy:
+    """Where the reward of all second cycles leads, scene by scene with their titles; empty without such a reward."""
+
+    seen: tuple[tuple[str, SolvedScene], ...]
+    unseen: tuple[tuple[str, SolvedScene], ...]
+    #: For which unseen scenes the study's hallway has no room, and why.
+    notes: tuple[str, ...]
+
+
+def pooled_policy(study: Study) -> PooledPolicy:
+    """Solve the scene of the first second-cycle trial, and scenes made from it, under the pooled reward.
+
+    Raises:
+        InfinitePartitionError: The reward has no policy in one of them.
+    """
+    if study.pooled.second is None:
+        return PooledPolicy((), (), ())
+    reward, one = study.pooled.second.fit.reward, study.seconds[0]
+    scene, unseen, notes = scenes_of([one])[0], [], []
+    for title, make in (
+        ("two people", two_people),
+        ("person beside a large obstacle", partial(beside_obstacle, robot_radius_m=one.robot_radius_m)),
+    ):
+        try:
+            unseen.append((title, solved(reward, make(scene))))
+        except SceneError as error:
+            notes.append(f"no unseen scene with {title}: {error}")
+    return PooledPolicy((("scene of the study", solved(reward, scene)),), tuple(unseen), tuple(notes))
 
 
 def two_people(scene: Scene) -> Scene:

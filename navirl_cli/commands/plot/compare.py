@@ -1,15 +1,13 @@
 """Figures that set rewards, or groups of demonstrations, beside each other or beside chance."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.commands.plot.maps import Sight, trial_of
-from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_option
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
 from navirl_cli.commands.shared import FilePath, demonstrations_in, demos_argument, progress_bar, seed_option
 from navirl_cli.errors import DemonstrationError
 
@@ -33,10 +31,13 @@ _GROUP = "A condition with cycle and set, as in the tables of evaluate, e.g. 'fo
 )
 @seed_option
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
-    """Ranks of demonstrations among the policy's own paths by log-likelihood: uniform where the policy is right."""
+    """Draw how demonstrations rank among paths of the policy.
+
+    Ranks are by log-likelihood. They are uniform if the policy is right.
+    """
     import numpy as np
 
-    from navirl_cli.evaluation.ranks import ranks_of
+    from navirl_cli.evaluation.ranks import ranks_of, uniformity
     from navirl_cli.figures.ranks import draw_ranks
 
     demonstrations = demonstrations_in(demos)
@@ -46,7 +47,7 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
         found = ranks_of(
             chosen, learnt, samples, np.random.default_rng(seed), progress=lambda done, _all: update(done, "")
         )
-    page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found])))
+    page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found]), uniformity(found)[1]))
 
 
 @click.command()
@@ -59,7 +60,11 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
 def compare(
     page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
 ) -> None:
-    """Rewards beside each other in the scene of one trial (policy and state reward), or paths of groups."""
+    """Draw several rewards, or several groups, side by side.
+
+    Give two or more --reward, for policy and state reward in the scene of one trial; or two or more --group, for
+    their driven paths.
+    """
     if min(len(rewards), len(groups)) > 0 or max(len(rewards), len(groups)) < 2:
         raise click.UsageError("compare needs two or more --reward, or two or more --group")
     if groups and trial is not None:
@@ -87,16 +92,15 @@ def _draw_rewards(
 
     from navirl_cli.figures.cells import LEAST_VISITS, likely_window, scene_window
     from navirl_cli.figures.policies import draw_policy_and_reward
+    from navirl_cli.irl.scene import scenes_of
+    from navirl_cli.irl.solved import solved
 
     one = trial_of(demonstrations, trial)
-    learnt = {path: read_reward_for(path, demonstrations).reward for path in rewards}
-    first = Sight(demonstrations, one, learnt[rewards[0]], crop=crop)
-    scene, rows = first.scene, []
+    scene, rows, stems = scenes_of([one])[0], [], [path.stem for path in rewards]
     for path in rewards:
-        sight = replace(first, reward=learnt[path])
-        name = path.stem if [other.stem for other in rewards].count(path.stem) == 1 else str(path)
-        rows.append((name, scene, sight.visits, sight.reward.by_cell(scene)))
-    most = np.max([visits for _, _, visits, _ in rows], axis=0)
+        name = path.stem if stems.count(path.stem) == 1 else str(path)
+        rows.append((name, solved(read_reward_for(path, demonstrations).reward, scene)))
+    most = np.max([solution.visits for _, solution in rows], axis=0)
     window = likely_window(scene, most) if crop else scene_window(scene, most >= LEAST_VISITS)
     page.draw(
         lambda axes: draw_policy_and_reward(axes, rows, one.robot_radius_m, window), panels=2 * len(rows), columns=2

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_option
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
 from navirl_cli.commands.shared import Function, demonstrations_in, demos_argument, seed_option
-from navirl_cli.errors import DemonstrationError
 
 if TYPE_CHECKING:
     from navirl_cli.arrays import FloatArray
@@ -24,18 +23,6 @@ if TYPE_CHECKING:
 
 #: What --overlay takes.
 DEMOS, SAMPLES = "demos", "samples"
-
-
-def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "Demonstration":
-    """The demonstration that was asked for, or the first.
-
-    Raises:
-        DemonstrationError: None is called so.
-    """
-    for one in demonstrations:
-        if trial in {None, one.id}:
-            return one
-    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +118,10 @@ def scene_options(function: Function) -> Function:
 @click.command()
 @scene_options
 def policy(page: Page, sight: Sight) -> None:
-    """Where the learnt policy leads: expected visits of every cell (as the paper's Fig. 8, left)."""
+    """Draw expected visits of every cell under the learnt policy.
+
+    As in Fig. 8 of the paper, left: where the policy leads in the scene of one trial.
+    """
     from navirl_cli.figures.cells import draw_policy
 
     page.draw(lambda axes: draw_policy(axes[0], sight.scene, sight.visits, **sight.options))
@@ -140,7 +130,10 @@ def policy(page: Page, sight: Sight) -> None:
 @click.command()
 @scene_options
 def reward(page: Page, sight: Sight) -> None:
-    """The learnt reward of every cell, with the nominal path (as the paper's Fig. 8, right)."""
+    """Draw the learnt reward of every cell.
+
+    As in Fig. 8 of the paper, right, with the nominal path. The cost of path length is not in it.
+    """
     from navirl_cli.figures.cells import draw_reward
 
     page.draw(lambda axes: draw_reward(axes[0], sight.scene, sight.reward.by_cell(sight.scene), **sight.options))
@@ -149,7 +142,10 @@ def reward(page: Page, sight: Sight) -> None:
 @click.command()
 @scene_options
 def value(page: Page, sight: Sight) -> None:
-    """The soft value of every cell: expected reward on the way to the goal, with lines of equal value."""
+    """Draw the soft value of every cell, with contour lines.
+
+    The soft value is the expected reward from the cell to the goal, with the entropy of the moves.
+    """
     from navirl_cli.figures.values import draw_value
 
     page.draw(lambda axes: draw_value(axes[0], sight.scene, sight.policy.value, **sight.options))
@@ -158,7 +154,10 @@ def value(page: Page, sight: Sight) -> None:
 @click.command()
 @scene_options
 def actions(page: Page, sight: Sight) -> None:
-    """The most likely move in every cell as an arrow, the longer the surer."""
+    """Draw the most likely move in every cell as an arrow.
+
+    The longer an arrow, the more probable is its move.
+    """
     from navirl_cli.figures.actions import draw_actions
 
     page.draw(lambda axes: draw_actions(axes[0], sight.scene, sight.policy.probability, **sight.options))

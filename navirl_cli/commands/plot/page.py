@@ -1,18 +1,41 @@
 """What every command of ``navirl plot`` takes: where to write, how wide, for paper or for a screen."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
+from os import fsdecode
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.commands.shared import FilePath, Function, force_option, output_option
+from navirl_cli.commands.shared import FilePath, Function, force_option
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.files import check_writable
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is not imported before a figure is drawn.
 STYLES = ("paper", "screen", "dark")
+#: Endings of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
+FORMATS = ("png", "pdf", "svg")
+
+
+class FigurePath(click.Path):
+    """The name of a figure, whose ending chooses the format."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Refuse an ending that is no format."""
+        path = Path(fsdecode(super().convert(value, param, ctx)))
+        if path.suffix.lower().removeprefix(".") not in FORMATS:
+            *others, last = (f".{extension}" for extension in FORMATS)
+            self.fail(f"expected a name that ends in {', '.join(others)} or {last}, found {path.name!r}", param, ctx)
+        return path
 
 
 @dataclass(frozen=True)
@@ -69,13 +92,11 @@ def page_options(function: Function) -> Function:
 
     @wraps(function)
     def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
-        from navirl_cli.figures.sheet import check_target
-
-        check_target(output, force=force)
+        check_writable(output, force=force)
         return function(page=Page(output, wide, style, force), **others)
 
     options = (
-        output_option("Figure to write: .png, .pdf or .svg."),
+        click.option("-o", "--output", type=FigurePath(), required=True, help="Figure to write: .png, .pdf or .svg."),
         click.option("--wide", is_flag=True, help="As wide as a page of two columns (7.16 in), not one (3.5 in)."),
         click.option(
             "--style",
@@ -94,3 +115,15 @@ def page_options(function: Function) -> Function:
 crop_option = click.option("--crop", is_flag=True, help="Show no more of the map than what surrounds the paths.")
 trial_option = click.option("--trial", help="Draw this trial, e.g. p01/3; the first one by default.")
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
+
+
+def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "Demonstration":
+    """The demonstration that was asked for, or the first.
+
+    Raises:
+        DemonstrationError: None is called so.
+    """
+    for one in demonstrations:
+        if trial in {None, one.id}:
+            return one
+    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")

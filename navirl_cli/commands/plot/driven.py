@@ -1,0 +1,104 @@
+"""Figures of demonstrations: their paths, properties and forces."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, trial_of, trial_option
+from navirl_cli.commands.shared import (
+    FilePath,
+    demonstrations_in,
+    demos_argument,
+    progress_bar,
+    samples_option,
+    say,
+    seed_option,
+)
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
+    from navirl_cli.evaluation.compare import Comparison
+    from navirl_cli.figures.properties import PropertyBar
+
+
+@click.command()
+@page_options
+@demos_argument
+@crop_option
+def paths(page: Page, demos: Path, crop: bool) -> None:
+    """Draw all driven paths over the map, by condition.
+
+    As in Fig. 3 of the paper. Stretches in contact are thicker.
+    """
+    from navirl_cli.figures.paths import draw_paths
+
+    demonstrations = demonstrations_in(demos)
+    page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
+
+
+@click.command()
+@page_options
+@demos_argument
+@click.option("--reward", type=FilePath, help="Learnt reward: adds bars of its paths in the scenes it was learnt from.")
+@samples_option
+@seed_option
+def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed: int) -> None:
+    """Draw length, distance and area of paths as bars, by group.
+
+    As in Fig. 7 of the paper: means, with standard deviations as whiskers.
+    """
+    from navirl_cli.evaluation.metrics import PAPER_METRICS
+    from navirl_cli.figures.properties import draw_properties, height_for
+
+    demonstrations = demonstrations_in(demos)
+    learnt = None if reward is None else read_reward_for(reward, demonstrations)
+    bars = _bars(demonstrations, learnt, samples, seed)
+    page.draw(
+        lambda axes: draw_properties(axes, bars), height_in=height_for(bars, page.width_in), panels=len(PAPER_METRICS)
+    )
+
+
+@click.command()
+@page_options
+@demos_argument
+@trial_option
+@crop_option
+def forces(page: Page, demos: Path, trial: str | None, crop: bool) -> None:
+    """Draw the forces of one trial, over time and along its path.
+
+    Contacts are shaded, with peak force and impulse.
+    """
+    from navirl_cli.figures.forces import draw_forces
+
+    one = trial_of(demonstrations_in(demos), trial)
+    page.draw(lambda axes: draw_forces(axes, one, crop=crop), panels=2, columns=1)
+
+
+def _bars(
+    demonstrations: list["Demonstration"], learnt: LearntReward | None, samples: int, seed: int
+) -> list["PropertyBar"]:
+    """What was driven in every group, and in the groups that the policy was learnt from what it drives."""
+    import numpy as np
+
+    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
+    from navirl_cli.evaluation.drawn import Precision
+    from navirl_cli.evaluation.groups import group_of
+    from navirl_cli.figures.properties import bars_of
+
+    with progress_bar("evaluate", len(demonstrations)) as update:
+        result: Comparison = compare(
+            demonstrations,
+            {} if learnt is None else {LEARNT: learnt.reward},
+            Precision(samples),
+            np.random.default_rng(seed),
+            progress=lambda done, _all: update(done, ""),
+        )
+    taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
+    for note in result.notes:
+        say(note)
+    # Learnt paths go from cell to cell: beside them stand the driven ones along their cells.
+    return bars_of(
+        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in taught)
+    )

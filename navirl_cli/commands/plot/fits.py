@@ -1,0 +1,50 @@
+"""Figures of a fit: profile likelihoods, and its iterations."""
+
+from math import ceil
+from pathlib import Path
+
+import click
+
+from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.commands.plot.page import Page, page_options
+from navirl_cli.commands.shared import FilePath
+from navirl_cli.errors import ArtefactError
+
+
+@click.command()
+@page_options
+@click.argument("reward", type=FilePath)
+def profile(page: Page, reward: Path) -> None:
+    """Draw profile likelihoods of a fit.
+
+    They show how well the data identify a parameter. The reward file holds them after navirl fit --profile.
+    """
+    from navirl_cli.figures.profile import draw_profiles
+
+    learnt = read_reward(reward)
+    if not learnt.profiles:
+        raise ArtefactError(f"{reward}: holds no profile; make it with navirl fit --profile sigma_p")
+    units = {parameter.name: parameter.unit for parameter in learnt.reward.parameters}
+    with page.look():
+        figure = draw_profiles(learnt.profiles, units, page.width_in)
+    page.save(figure, trim=False)
+
+
+@click.command()
+@page_options
+@click.argument("reward", type=FilePath)
+def convergence(page: Page, reward: Path) -> None:
+    """Draw log-likelihood and parameters over a fit's iterations."""
+    from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
+
+    learnt = read_reward(reward)
+    search, parameters = learnt.search, learnt.reward.parameters
+    if search is None:
+        raise ArtefactError(f"{reward}: holds no iterations, as files of older versions; fit anew with navirl fit")
+    panels, columns = 1 + len(parameters), columns_for(page.width_in)
+    page.draw(
+        lambda axes: draw_convergence(axes, search.log_likelihood, search.theta, parameters),
+        height_in=ceil(panels / columns) * ROW_IN,
+        panels=panels,
+        columns=columns,
+    )
