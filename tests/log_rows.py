@@ -1,4 +1,4 @@
-"""Messages as rows of bytes, however they were read, so that they can be compared to the bit."""
+"""Messages as rows of bytes, so that what two readers read can be compared to the bit."""
 
 import json
 import struct
@@ -19,18 +19,18 @@ from navirl_cli.logs.messages.reader import Contents, Series
 #: A message: time of receipt, and its columns' bytes.
 Row = tuple[int, tuple[bytes, ...]]
 #: Name, encoding and text of a schema, and the messages' encoding.
-Kind = tuple[str, str, bytes, str]
-#: What rosbags raises on definitions and payloads that are none.
+MessageType = tuple[str, str, bytes, str]
+#: What rosbags raises on definitions and payloads that do not parse.
 UNDECODABLE = (
     *(TypesysError, SerdeError, SyntaxError, LookupError, ValueError, TypeError, AttributeError, AssertionError),
     *(OverflowError, RecursionError, struct.error),
 )
 
 
-def slow_columns(kind: Kind, payload: bytes, paths: Sequence[str], series: Series) -> tuple[bytes, ...]:
-    """A message's columns by rosbags or Python's JSON; none where they cannot decode it."""
+def slow_columns(message_type: MessageType, payload: bytes, paths: Sequence[str], series: Series) -> tuple[bytes, ...]:
+    """A message's columns by rosbags or Python's JSON; empty where they cannot decode it."""
     try:
-        message = json.loads(payload) if kind[3] == "json" else decoder(*kind)(payload)
+        message = json.loads(payload) if message_type[3] == "json" else decoder(*message_type)(payload)
         return tuple(as_bytes(values_at(message, path), series.columns[path].dtype) for path in paths)
     except UNDECODABLE:
         return ()
@@ -38,7 +38,7 @@ def slow_columns(kind: Kind, payload: bytes, paths: Sequence[str], series: Serie
 
 @cache
 def decoder(name: str, encoding: str, text: bytes, message_encoding: str) -> Callable[[bytes], Any]:
-    """What rosbags makes of a definition."""
+    """The function by which rosbags decodes messages of a definition."""
     store = get_typestore(Stores.EMPTY)
     full = name if name.count("/") != 1 else name.replace("/", "/msg/")
     words = text.decode(errors="replace").replace("\r\n", "\n")
@@ -48,7 +48,7 @@ def decoder(name: str, encoding: str, text: bytes, message_encoding: str) -> Cal
 
 
 def values_at(message: Any, path: str) -> list[Any]:
-    """A field of a message, or of each entry of a sequence."""
+    """The value of a field, or its values in the entries of a sequence."""
     found = [message]
     for part in path.split("."):
         name = part.removesuffix("[]")
@@ -59,7 +59,7 @@ def values_at(message: Any, path: str) -> list[Any]:
 
 
 def in_ns(value: Any) -> Any:
-    """A time in ns, anything else as it is."""
+    """A time in ns; any other value as it is."""
     fields = value if isinstance(value, dict) else vars(value) if hasattr(value, "__msgtype__") else {}
     return int(fields["sec"]) * 10**9 + int(fields["nanosec"]) if "nanosec" in fields else value
 
@@ -73,15 +73,15 @@ def as_bytes(values: Any, dtype: np.dtype[Any]) -> bytes:
 
 def rows_of(series: Series) -> list[Row]:
     """The messages of a series."""
-    parts = []
+    columns = []
     for path, column in series.columns.items():
         if "[]" in path:
             ends = np.cumsum(series.counts[path.partition("[]")[0] + "[]"])
             pieces = np.split(column, ends)[:-1]
         else:
             pieces = column[:, None]
-        parts.append([as_bytes(piece, column.dtype) for piece in pieces])
-    return list(zip(series.log_time_ns.tolist(), zip(*parts, strict=True), strict=True))
+        columns.append([as_bytes(piece, column.dtype) for piece in pieces])
+    return list(zip(series.log_time_ns.tolist(), zip(*columns, strict=True), strict=True))
 
 
 def same_series(found: Mapping[str, Series], right: Mapping[str, Series]) -> bool:
@@ -101,7 +101,7 @@ def same_arrays(one: Any, other: Any) -> bool:
 
 
 def same_recordings(one: Any, other: Any) -> bool:
-    """Whether two recordings, or parts of them, hold the same; how the file is called does not matter."""
+    """Whether two recordings, or parts of them, hold the same; the file's name does not matter."""
     if is_dataclass(one) and type(one) is type(other):
         names = [field.name for field in fields(one) if field.name not in {"log", "notes"}]
         return all(same_recordings(getattr(one, name), getattr(other, name)) for name in names)

@@ -1,4 +1,4 @@
-"""A minute of log with 33,000 wanted messages, in every way of writing, and what is where in it."""
+"""A minute of log with 33,000 wanted messages, in variants of the format, and what stands where in it."""
 
 import io
 import re
@@ -14,7 +14,7 @@ import strict_log
 import zstandard
 from log_factory import START_NS
 from mcap.writer import CompressionType, IndexType
-from strict_log import Told
+from strict_log import StrictMessage
 
 from navirl_cli.logs.messages.reader import read
 
@@ -57,13 +57,13 @@ OPTIONS = {
     "unchunked": {"use_chunking": False, "enable_data_crcs": True},
     "unchunked, no summary": {"use_chunking": False, **BARE},
 }
-#: What many notes on damage end with.
+#: The ends of many reasons.
 CUT = "the messages before the cut were read, those behind it are lost"
 BEHIND = "what stands behind it is lost"
 
 
 class Log:
-    """A sound file, and what is where in it."""
+    """An intact file, and what stands where in it."""
 
     def __init__(self, path: Path) -> None:
         self.data = path.read_bytes()
@@ -73,36 +73,40 @@ class Log:
         self.chunks = self.strict.chunks()
 
     def chunk_of(self, number: int) -> int:
-        """Which chunk the wanted message of that number (from 1) is in."""
+        """The number of the chunk that holds a wanted message, which is numbered from 1."""
         return self.chunks.index(self.wanted[number - 1].chunk)
 
-    def inside(self, chunk: int) -> list[Told]:
-        return [told for told in self.wanted if told.chunk == self.chunks[chunk]]
+    def inside(self, chunk: int) -> list[StrictMessage]:
+        return [message for message in self.wanted if message.chunk == self.chunks[chunk]]
 
-    def without(self, lost: list[Told]) -> list[Told]:
-        gone = {id(told) for told in lost}
-        return [told for told in self.wanted if id(told) not in gone]
+    def without(self, lost: list[StrictMessage]) -> list[StrictMessage]:
+        gone = {id(message) for message in lost}
+        return [message for message in self.wanted if id(message) not in gone]
 
-    def before(self, cut: int) -> list[Told]:
+    def before(self, cut: int) -> list[StrictMessage]:
         """Wanted messages whose bytes all stand before a cut."""
         return [
-            told
-            for told in self.wanted
-            if (told.chunk or told.place).stop <= cut
-            or (told.chunk and told.chunk.start < cut and told.place.stop <= len(self.start_of(told.chunk, cut)))
+            message
+            for message in self.wanted
+            if (message.chunk or message.place).stop <= cut
+            or (
+                message.chunk
+                and message.chunk.start < cut
+                and message.place.stop <= len(self.start_of(message.chunk, cut))
+            )
         ]
 
     @cache  # noqa: B019 - as long as the module's tests
     def start_of(self, chunk: strict_log.Record, cut: int) -> bytes:
-        """What a cut chunk's bytes decompress to."""
+        """The records that a cut chunk still decompresses to."""
         content = self.data[chunk.start + 9 : cut]
         if len(content) < 60:
             return b""
         _, _, compression, at, _ = strict_log.chunk_head(content)
-        return unpacked(compression, content[at:])
+        return decompressed(compression, content[at:])
 
     def cut_behind(self, number: int) -> int:
-        """The first place at which a cut leaves so many wanted messages."""
+        """The first place for a cut that leaves this number of wanted messages."""
         last = self.wanted[number - 1]
         low, high = last.chunk.start, last.chunk.stop
         while low < high - 1:
@@ -113,7 +117,9 @@ class Log:
 
     def span(self, chunk: int) -> tuple[float, float]:
         """Time of a chunk's messages since the file's first one, s."""
-        times = [told.log_time_ns - START_NS for told in self.strict.messages if told.chunk == self.chunks[chunk]]
+        times = [
+            message.log_time_ns - START_NS for message in self.strict.messages if message.chunk == self.chunks[chunk]
+        ]
         return min(times) / 1e9, max(times) / 1e9
 
     def end(self, chunk: int) -> int:
@@ -123,12 +129,14 @@ class Log:
 
     def latest_s(self, stop: int) -> float:
         """Time of the last message before a byte, s."""
-        times = [told.log_time_ns for told in self.strict.messages if (told.chunk or told.place).stop <= stop]
+        times = [
+            message.log_time_ns for message in self.strict.messages if (message.chunk or message.place).stop <= stop
+        ]
         return (max(times) - START_NS) / 1e9
 
 
-def unpacked(compression: str, data: bytes) -> bytes:
-    """The start of a compressed stream that is cut."""
+def decompressed(compression: str, data: bytes) -> bytes:
+    """What a compressed stream that is cut decompresses to."""
     if compression == "zstd":
         return zstandard.ZstdDecompressor().stream_reader(io.BytesIO(data)).read()
     if compression == "lz4":
@@ -137,7 +145,7 @@ def unpacked(compression: str, data: bytes) -> bytes:
 
 
 def payloads(template: bytes, times_ns: np.ndarray, tails: np.ndarray) -> list[bytes]:
-    """Copies of a message with other stamps and other numbers at its end."""
+    """Copies of a message that differ in stamp and in the numbers at its end."""
     rows = np.tile(np.frombuffer(template, dtype=np.uint8), (len(times_ns), 1))
     stamps = np.stack(np.divmod(times_ns - 10**6, 10**9), axis=1).astype("<u4")
     rows[:, 4:12] = stamps.view(np.uint8)
@@ -147,7 +155,7 @@ def payloads(template: bytes, times_ns: np.ndarray, tails: np.ndarray) -> list[b
 
 @cache
 def messages() -> list[forge.Message]:
-    """33,000 wanted messages, and images between them that nobody wants."""
+    """33,000 wanted messages, and images between them that are not wanted."""
     rng = np.random.default_rng(3)
     wrench, odometry = forge.cdr(forge.wrench(0, (0, 0, 0))), forge.cdr(forge.odometry(0, 0, 0))
     rows = {
@@ -167,58 +175,57 @@ def messages() -> list[forge.Message]:
 
 
 @lru_cache(maxsize=8)
-def sound(way: str) -> Log:
-    """The sound file that is written in a way of `OPTIONS`."""
+def intact(variant: str) -> Log:
+    """The intact file of a variant of `OPTIONS`."""
     with TemporaryDirectory() as folder:
-        return Log(forge.forge(Path(folder) / "minute.mcap", messages(), chunk_size=CHUNK_BYTES, **OPTIONS[way]))
+        return Log(forge.forge(Path(folder) / "minute.mcap", messages(), chunk_size=CHUNK_BYTES, **OPTIONS[variant]))
 
 
-def check(path: Path, data: bytes, kept: list[Told], *notes: tuple) -> None:
-    """Read a damaged file, and compare bit by bit what is read, and word by word what is said.
+def check(path: Path, data: bytes, kept: list[StrictMessage], *damages: tuple) -> None:
+    """Read a damaged file; compare the values bit by bit and the reported damage word by word.
 
     Args:
-        path: Where it is written to.
+        path: Where the file is written.
         data: Its bytes.
         kept: The wanted messages that must be read.
-        notes: Of each damage, in order: first byte, first byte behind it, span in s or None, pattern of the reason.
+        damages: Of each damage, in order: first byte, first byte after it, span in s or None, pattern of the reason.
     """
     path.write_bytes(data)
     result = read(path, WANTS)
     for topic, (times_ns, columns) in TRUTH.items():
-        there = [told.log_time_ns for told in kept if told.channel == CHANNELS[topic]]
+        there = [message.log_time_ns for message in kept if message.channel == CHANNELS[topic]]
         rows = np.searchsorted(times_ns, there)
         series = result.series[topic]
         assert series.log_time_ns.tolist() == there == times_ns[rows].tolist()
         for field, column in columns.items():
             assert series.columns[field].tobytes() == column[rows].tobytes(), field
-    found = [(note.start, note.stop, note.span_s, note.reason) for note in result.damage]
-    assert [note[:2] for note in found] == [note[:2] for note in notes]
-    for note, (*_, span_s, reason) in zip(found, notes, strict=True):
-        assert note[2] == (span_s if span_s is None else pytest.approx(span_s, abs=1e-9)), note
-        assert re.fullmatch(reason, note[3]), note
-    assert all(note.path == path for note in result.damage)
+    assert [(one.start, one.stop) for one in result.damage] == [one[:2] for one in damages]
+    for one, (*_, span_s, reason) in zip(result.damage, damages, strict=True):
+        assert one.span_s == (span_s if span_s is None else pytest.approx(span_s, abs=1e-9)), one
+        assert re.fullmatch(reason, one.reason), one
+        assert one.path == path
 
 
-def body(log: Log, told: Told) -> slice:
-    """Bytes of the file in which a message stands that is not compressed."""
-    if told.chunk is None:
-        return slice(*told.place[1:])
-    start = told.chunk.start + 9 + strict_log.chunk_head(log.data[told.chunk.inside])[3]
-    return slice(start + told.place.start, start + told.place.stop)
+def body(log: Log, message: StrictMessage) -> slice:
+    """Bytes of the file that hold an uncompressed message."""
+    if message.chunk is None:
+        return slice(*message.place[1:])
+    start = message.chunk.start + 9 + strict_log.chunk_head(log.data[message.chunk.contents])[3]
+    return slice(start + message.place.start, start + message.place.stop)
 
 
 def overwritten(log: Log, at: int, new: bytes) -> bytes:
     return log.data[:at] + new + log.data[at + len(new) :]
 
 
-def lost_in(log: Log, number: int, way: str) -> str:
-    """Words for the messages of a chunk, which only its message index counts."""
-    if "no summary" in way:
+def lost_in(log: Log, number: int, variant: str) -> str:
+    """The text for the lost messages of a chunk, which only its message index counts."""
+    if "no summary" in variant:
         return "messages lost: an unknown number"
-    counts = [sum(told.channel == channel for told in log.inside(number)) for channel in CHANNELS.values()]
+    counts = [sum(message.channel == channel for message in log.inside(number)) for channel in CHANNELS.values()]
     return "messages lost: {} of /wrench, {} of /odom".format(*counts)
 
 
 def fewest(log: Log) -> int:
-    """The chunk with fewest wanted messages, but for the first and the last."""
+    """The chunk with the fewest wanted messages, except for the first and the last."""
     return min(range(1, len(log.chunks) - 1), key=lambda number: len(log.inside(number)))

@@ -1,11 +1,11 @@
-"""Ways to break a log: a number always breaks the same log in the same way."""
+"""Mutations that break a log; a number always gives the same broken log."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
-from small_logs import Base, packed
+from small_logs import IntactLog, compressed
 
 EXTREMES = (0, 1, 2, 3, 0x7F, 0xFF, 0x7FFF, 0xFFFF, *(2**k + d for k in (28, 31, 32, 63) for d in (-1, 0)), 2**64 - 1)
 
@@ -14,22 +14,22 @@ EXTREMES = (0, 1, 2, 3, 0x7F, 0xFF, 0x7FFF, 0xFFFF, *(2**k + d for k in (28, 31,
 class Breaking:
     """A log that is being broken."""
 
-    base: Base
-    others: list[Base]
+    log: IntactLog
+    others: Sequence[IntactLog]
     rng: Generator
     data: bytearray
-    #: What was done, in words.
+    #: Names of the mutations so far.
     done: list[str] = field(default_factory=list)
 
     def number(self, low: int, high: int) -> int:
         return int(self.rng.integers(low, max(low + 1, high)))
 
     def place(self) -> int:
-        """A byte: anywhere, or at something that matters."""
+        """A byte anywhere, or at a place of `spots`."""
         if self.rng.random() < 0.2:
             return self.number(0, len(self.data))
-        name = list(self.base.spots)[self.number(0, len(self.base.spots))]
-        places = self.base.spots[name]
+        name = list(self.log.spots)[self.number(0, len(self.log.spots))]
+        places = self.log.spots[name]
         start, stop = places[self.number(0, len(places))] if places else (0, 1)
         return min(self.number(start, stop), len(self.data) - 1)
 
@@ -37,12 +37,12 @@ class Breaking:
         return int(2 ** self.rng.uniform(0, 9))
 
     def block(self) -> slice:
-        """Some bytes: whole records, or whatever stands there."""
+        """Bytes of one to three records, or of any length at any place."""
         if self.rng.random() < 0.5:
             at = self.place()
             return slice(at, at + self.length())
-        records = self.base.strict.records
-        alone = [told.place for told in self.base.strict.messages if told.chunk is None]
+        records = self.log.strict.records
+        alone = [message.place for message in self.log.strict.messages if message.chunk is None]
         if alone and self.rng.random() < 0.5:
             records = alone
         first = self.number(0, len(records))
@@ -50,74 +50,82 @@ class Breaking:
         return slice(records[first].start, records[last].stop)
 
 
-def flip(log: Breaking) -> None:
-    for _ in range(log.number(1, 9) if log.rng.random() < 0.3 else 1):
-        log.data[log.place()] ^= 1 << log.number(0, 8)
+def flip(breaking: Breaking) -> None:
+    for _ in range(breaking.number(1, 9) if breaking.rng.random() < 0.3 else 1):
+        breaking.data[breaking.place()] ^= 1 << breaking.number(0, 8)
 
 
-def overwrite(log: Breaking) -> None:
-    at, count = log.place(), log.length()
-    kind = log.number(0, 3)
-    new = (bytes(count), b"\xff" * count, log.rng.bytes(count))[kind]
-    log.data[at : at + count] = new[: len(log.data) - at]
+def overwrite(breaking: Breaking) -> None:
+    at, count = breaking.place(), breaking.length()
+    kind = breaking.number(0, 3)
+    new = (bytes(count), b"\xff" * count, breaking.rng.bytes(count))[kind]
+    breaking.data[at : at + count] = new[: len(breaking.data) - at]
 
 
-def cut(log: Breaking) -> None:
-    del log.data[log.place() :]
+def cut(breaking: Breaking) -> None:
+    del breaking.data[breaking.place() :]
 
 
-def insert(log: Breaking) -> None:
-    at, count = log.place(), log.length()
-    log.data[at:at] = log.rng.bytes(count) if log.rng.random() < 0.7 else bytes(count)
+def insert(breaking: Breaking) -> None:
+    at, count = breaking.place(), breaking.length()
+    breaking.data[at:at] = breaking.rng.bytes(count) if breaking.rng.random() < 0.7 else bytes(count)
 
 
-def delete(log: Breaking) -> None:
-    del log.data[log.block()]
+def delete(breaking: Breaking) -> None:
+    del breaking.data[breaking.block()]
 
 
-def duplicate(log: Breaking) -> None:
-    block = log.block()
-    at = block.stop if log.rng.random() < 0.7 else log.place()
-    log.data[at:at] = log.data[block]
+def duplicate(breaking: Breaking) -> None:
+    block = breaking.block()
+    at = block.stop if breaking.rng.random() < 0.7 else breaking.place()
+    breaking.data[at:at] = breaking.data[block]
 
 
-def swap(log: Breaking) -> None:
-    first, second = sorted((log.block(), log.block()), key=lambda block: block.start)
+def swap(breaking: Breaking) -> None:
+    first, second = sorted((breaking.block(), breaking.block()), key=lambda block: block.start)
     if first.stop <= second.start:
-        one, other = log.data[first], log.data[second]
-        log.data[second] = one
-        log.data[first] = other
+        one, other = breaking.data[first], breaking.data[second]
+        breaking.data[second] = one
+        breaking.data[first] = other
 
 
-def splice(log: Breaking) -> None:
-    """The start of this log and the end of another."""
-    other = log.others[log.number(0, len(log.others))]
-    mine, theirs = log.place(), log.number(0, len(other.data))
-    if log.rng.random() < 0.6:
-        mine, theirs = log.block().start, other.strict.records[log.number(0, len(other.strict.records))].start
-    log.data[mine:] = other.data[theirs:]
+def splice(breaking: Breaking) -> None:
+    """Join the start of this log and the end of another."""
+    other = breaking.others[breaking.number(0, len(breaking.others))]
+    mine, theirs = breaking.place(), breaking.number(0, len(other.data))
+    if breaking.rng.random() < 0.6:
+        mine, theirs = breaking.block().start, other.strict.records[breaking.number(0, len(other.strict.records))].start
+    breaking.data[mine:] = other.data[theirs:]
 
 
-def extreme(log: Breaking) -> None:
-    """A length, place, id or time becomes another."""
-    at, width = log.base.fields[log.number(0, len(log.base.fields))]
-    if log.rng.random() < 0.2:
-        at, width = log.place(), (2, 4, 8)[log.number(0, 3)]
-    own = int.from_bytes(log.data[at : at + width], "little")
-    near = (own + 1, own - 1, 2 * own, own // 2, len(log.data), len(log.data) - at, own + log.number(0, 300))
-    choice = (*EXTREMES, *near)[log.number(0, len(EXTREMES) + len(near))]
-    log.data[at : at + width] = (choice % 256**width).to_bytes(width, "little")[: max(0, len(log.data) - at)]
+def extreme(breaking: Breaking) -> None:
+    """Change a length, place, id or time."""
+    at, width = breaking.log.fields[breaking.number(0, len(breaking.log.fields))]
+    if breaking.rng.random() < 0.2:
+        at, width = breaking.place(), (2, 4, 8)[breaking.number(0, 3)]
+    own = int.from_bytes(breaking.data[at : at + width], "little")
+    near = (
+        own + 1,
+        own - 1,
+        2 * own,
+        own // 2,
+        len(breaking.data),
+        len(breaking.data) - at,
+        own + breaking.number(0, 300),
+    )
+    choice = (*EXTREMES, *near)[breaking.number(0, len(EXTREMES) + len(near))]
+    breaking.data[at : at + width] = (choice % 256**width).to_bytes(width, "little")[: max(0, len(breaking.data) - at)]
 
 
-def reword(log: Breaking) -> None:
-    """A letter in a text that says what is what: topics, types, definitions."""
-    texts = [place for name in ("schema", "channel", "metadata") for place in log.base.spots.get(name, [])]
+def reword(breaking: Breaking) -> None:
+    """Change a letter in a topic, a type, a definition or metadata."""
+    texts = [place for name in ("schema", "channel", "metadata") for place in breaking.log.spots.get(name, [])]
     if not texts:
-        flip(log)
+        flip(breaking)
         return
-    start, stop = texts[log.number(0, len(texts))]
-    at = min(log.number(start, stop), len(log.data) - 1)
-    log.data[at] = b"\n\0 #/[]=_aezAZ0189\xff"[log.number(0, 19)]
+    start, stop = texts[breaking.number(0, len(texts))]
+    at = min(breaking.number(start, stop), len(breaking.data) - 1)
+    breaking.data[at] = b"\n\0 #/[]=_aezAZ0189\xff"[breaking.number(0, 19)]
 
 
 MUTATIONS: tuple[Callable[[Breaking], None], ...] = (
@@ -131,24 +139,25 @@ class Mutant:
     """A broken log."""
 
     number: int
-    base: Base
+    log: IntactLog
     #: The file's bytes.
     data: bytes
+    #: Names of the mutations.
     what: str
 
 
-def mutant(number: int, logs: list[Base], seed: int = 0) -> Mutant:
-    """The broken log of a number: one to five mutations of one base after the other."""
+def mutant(number: int, logs: Sequence[IntactLog], seed: int = 0) -> Mutant:
+    """The broken log of a number: one to five mutations of one of the logs."""
     rng = np.random.default_rng((seed, number))
     chosen = logs[number % len(logs)]
-    outside = chosen.packing and rng.random() < 0.5
-    start = packed(chosen.data, chosen.packing) if outside else chosen.data
-    log = Breaking(chosen, logs, rng, bytearray(start))
-    for _ in range((1, 1, 1, 1, 1, 2, 2, 3, 4, 5)[log.number(0, 10)]):
-        if not log.data:
+    # of a compressed file, either what is stored or what it decompresses to is broken
+    outside = chosen.compression and rng.random() < 0.5
+    breaking = Breaking(chosen, logs, rng, bytearray(chosen.stored if outside else chosen.data))
+    for _ in range((1, 1, 1, 1, 1, 2, 2, 3, 4, 5)[breaking.number(0, 10)]):
+        if not breaking.data:
             break
-        mutation = MUTATIONS[log.number(0, len(MUTATIONS))]
-        mutation(log)
-        log.done.append(mutation.__name__)
-    data = bytes(log.data)
-    return Mutant(number, chosen, data if outside else packed(data, chosen.packing), ", ".join(log.done))
+        mutation = MUTATIONS[breaking.number(0, len(MUTATIONS))]
+        mutation(breaking)
+        breaking.done.append(mutation.__name__)
+    data = bytes(breaking.data)
+    return Mutant(number, chosen, data if outside else compressed(data, chosen.compression), ", ".join(breaking.done))

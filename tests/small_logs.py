@@ -1,4 +1,4 @@
-"""Small logs that hold a trial, written in every way, and what stands where in them."""
+"""Small logs that hold a trial, one for each variant of the format, and what stands where in them."""
 
 import json
 import struct
@@ -20,9 +20,9 @@ WRENCH_HZ, ODOMETRY_HZ, TF_HZ, PEOPLE_HZ, IMAGE_HZ, LASTS_S, SPEED_M_S = 30, 10,
 
 
 def messages(encoding: str = "cdr", *, little_endian: bool = True, frames: bool = False) -> list[forge.Message]:
-    """A log that holds a trial: wrench, odometry, map, people, a goal, and blobs that nobody can read.
+    """The messages of a trial: wrench, odometry, map, people, a goal, and blobs whose definition does not parse.
 
-    With `frames` the odometry and the wrench are in frames of their own, and there is tf.
+    With `frames`, odometry and wrench are in frames of their own and tf connects them.
     """
     rng = np.random.default_rng(8)
 
@@ -40,7 +40,7 @@ def messages(encoding: str = "cdr", *, little_endian: bool = True, frames: bool 
 
 
 def drive(rng: Generator, *, frames: bool) -> Iterator[tuple[str, int, Any]]:
-    """Topic, time and message object of everything that can be read."""
+    """Topic, time and message object of all messages whose definition parses."""
     place = build("geometry_msgs/msg/Point", x=-1.0, y=-1.0, z=0.0)
     here = build("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
     info = build(
@@ -93,7 +93,7 @@ def link(t_ns: int, parent: str, child: str, x: float) -> Any:
 
 
 def plain(message: Any) -> Any:
-    """A message object as JSON has it."""
+    """A message object as JSON represents it."""
     if isinstance(message, np.ndarray):
         return message.tolist()
     if isinstance(message, list):
@@ -101,7 +101,7 @@ def plain(message: Any) -> Any:
     return {k: plain(v) for k, v in vars(message).items()} if hasattr(message, "__msgtype__") else message
 
 
-#: Name of a record, and the numbers that it starts with, as struct knows them.
+#: By code of a record: its name, and the format of the numbers that it starts with.
 NUMBERS = {
     strict_log.HEADER: ("header", "I"),
     strict_log.FOOTER: ("footer", "QQI"),
@@ -120,59 +120,65 @@ NUMBERS = {
 
 
 @dataclass(frozen=True)
-class Base:
-    """A sound log that is to be broken."""
+class IntactLog:
+    """A log that is to be broken."""
 
     name: str
-    #: The bytes of MCAP, and how the file is compressed as a whole: "zstd", "lz4" or "".
+    #: The bytes of MCAP.
     data: bytes
-    packing: str
+    #: Compression of the file: "zstd", "lz4" or "".
+    compression: str
     #: Whether CRCs protect all messages.
     protected: bool
-    strict: strict_log.Strict
-    #: Bytes [start, stop) by what stands there.
+    strict: strict_log.StrictLog
+    #: Bytes [start, stop), by what stands there.
     spots: dict[str, list[tuple[int, int]]]
-    #: Place and width of numbers that say how long something is, where it stands or whose it is.
+    #: Place and width of all lengths, places, ids and times.
     fields: list[tuple[int, int]]
 
+    @property
+    def stored(self) -> bytes:
+        """The bytes of the file."""
+        return compressed(self.data, self.compression)
 
-def packed(data: bytes, packing: str) -> bytes:
-    """A file's bytes, compressed as a whole or as they are."""
-    if packing == "zstd":
+
+def compressed(data: bytes, compression: str) -> bytes:
+    """A file's bytes, compressed or as they are."""
+    if compression == "zstd":
         return zstandard.ZstdCompressor(write_checksum=True).compress(data)
-    return lz4.frame.compress(data) if packing == "lz4" else data
+    return lz4.frame.compress(data) if compression == "lz4" else data
 
 
-def bases(folder: Path) -> list[Base]:
-    """Every way of writing, byte order, encoding and compression."""
+def intact_logs(folder: Path) -> list[IntactLog]:
+    """A log for each variant of writing, byte order, encoding and compression."""
     unchecked = forge.WAYS["uncompressed chunks"]
     plain = forge.WAYS["no summary, no chunks"]
     found = [
-        base(folder, way, messages(frames=way in {"zstd", "uncompressed chunks", "no summary, no chunks"}), options)
-        for way, options in forge.WAYS.items()
+        intact(folder, name, messages(frames=name in {"zstd", "uncompressed chunks", "no summary, no chunks"}), options)
+        for name, options in forge.WAYS.items()
     ]
     found += [
-        base(folder, "unchunked, data CRC", messages(), {"use_chunking": False, "enable_data_crcs": True}),
-        base(folder, "unchecked, no summary", messages(), {**forge.WAYS["no summary"], **unchecked}),
-        base(folder, "big-endian", messages(little_endian=False), unchecked),
-        base(folder, "ros1", messages("ros1"), unchecked, "ros1"),
-        base(folder, "ros1, no chunks", messages("ros1"), plain, "ros1"),
-        base(folder, "json", messages("json"), unchecked, "json"),
-        base(folder, "json, no chunks", messages("json"), plain, "json"),
-        base(folder, "packed with zstd", messages(), unchecked, packing="zstd"),
-        base(folder, "packed with lz4", messages(), {}, packing="lz4"),
+        intact(folder, "unchunked, data CRC", messages(), {"use_chunking": False, "enable_data_crcs": True}),
+        intact(folder, "unchecked, no summary", messages(), {**forge.WAYS["no summary"], **unchecked}),
+        intact(folder, "big-endian", messages(little_endian=False), unchecked),
+        intact(folder, "ros1", messages("ros1"), unchecked, "ros1"),
+        intact(folder, "ros1, no chunks", messages("ros1"), plain, "ros1"),
+        intact(folder, "json", messages("json"), unchecked, "json"),
+        intact(folder, "json, no chunks", messages("json"), plain, "json"),
+        intact(folder, "file compressed with zstd", messages(), unchecked, compression="zstd"),
+        intact(folder, "file compressed with lz4", messages(), {}, compression="lz4"),
     ]
     return found
 
 
-def base(
+def intact(
     folder: Path,
     name: str,
     messages: list[forge.Message],
     options: dict[str, Any],
     encoding: str = "cdr",
-    packing: str = "",
-) -> Base:
+    compression: str = "",
+) -> IntactLog:
     """A log and what stands where in it."""
     types = {message.typename for message in messages if message.typename != forge.BROKEN}
     definitions = {
@@ -181,7 +187,7 @@ def base(
         "json": dict.fromkeys(types, ("jsonschema", "{}")),
     }[encoding]
     path = forge.forge(
-        folder / "base.mcap",
+        folder / "intact.mcap",
         messages,
         definitions=definitions,
         encodings={message.topic: encoding for message in messages if message.topic != "/camera"},
@@ -193,11 +199,13 @@ def base(
     chunked, checked = options.get("use_chunking", True), options.get("enable_crcs", True)
     spots, fields = landmarks(data, strict)
     protected = bool(options.get("enable_data_crcs")) or (chunked and checked)
-    return Base(name, data, packing, protected, strict, spots, fields)
+    return IntactLog(name, data, compression, protected, strict, spots, fields)
 
 
-def landmarks(data: bytes, strict: strict_log.Strict) -> tuple[dict[str, list[tuple[int, int]]], list[tuple[int, int]]]:
-    """What a mutation can aim at."""
+def landmarks(
+    data: bytes, strict: strict_log.StrictLog
+) -> tuple[dict[str, list[tuple[int, int]]], list[tuple[int, int]]]:
+    """The `spots` and `fields` that mutations aim at."""
     spots: dict[str, list[tuple[int, int]]] = {"start": [(0, 60)], "end": [(len(data) - 60, len(data))]}
     fields: list[tuple[int, int]] = []
 
@@ -216,10 +224,10 @@ def landmarks(data: bytes, strict: strict_log.Strict) -> tuple[dict[str, list[tu
 
     for record in strict.records:
         mark(record, 0)
-    for told in strict.messages:
-        if told.chunk is None:
+    for message in strict.messages:
+        if message.chunk is None:
             continue
-        _, _, compression, at, _ = strict_log.chunk_head(data[told.chunk.inside])
+        _, _, compression, at, _ = strict_log.chunk_head(data[message.chunk.contents])
         if not compression:
-            mark(told.place, told.chunk.start + 9 + at)
+            mark(message.place, message.chunk.start + 9 + at)
     return {name: [one for one in places if one[0] < one[1]] for name, places in spots.items()}, fields

@@ -1,7 +1,7 @@
-"""A slow and strict twin of the reader: it takes a file as the specification words it, or says what is wrong with it.
+"""A slow and strict twin of the reader: it reads what the specification allows, and refuses everything else.
 
-Source: https://mcap.dev/spec. Nothing here goes on behind a fault, and nothing is taken from indexes: messages are
-those that a walk over the data section meets.
+Source: https://mcap.dev/spec. It stops at the first fault and takes nothing from indexes: the messages are those that a
+walk over the data section meets.
 """
 
 import struct
@@ -16,38 +16,37 @@ import zstandard
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX = range(1, 8)
 ATTACHMENT, STATISTICS, METADATA, DATA_END, PRIVATE = 0x09, 0x0B, 0x0C, 0x0F, 0x80
-IN_SUMMARY = frozenset({SCHEMA, CHANNEL, 0x08, 0x0A, STATISTICS, 0x0D, 0x0E})
 
 
 class FaultError(Exception):
-    """The bytes are no MCAP by the specification; the message says why."""
+    """The bytes break the specification; the message gives the reason."""
 
 
 class Record(NamedTuple):
-    """Bytes [start, stop) of what it stands in, its head of nine bytes included."""
+    """Bytes [start, stop) of the file or chunk that holds the record, with its head of nine bytes."""
 
     code: int
     start: int
     stop: int
 
     @property
-    def inside(self) -> slice:
+    def contents(self) -> slice:
         return slice(self.start + 9, self.stop)
 
 
-class Told(NamedTuple):
-    """A message where it stands."""
+class StrictMessage(NamedTuple):
+    """A message and where it stands."""
 
     channel: int
     log_time_ns: int
-    #: The chunk's uncompressed bytes, or the file, and where it stands in them.
+    #: The chunk's uncompressed bytes, or the file's, and where the message stands in them.
     raw: bytes
     place: Record
     chunk: Record | None
 
     @property
-    def whole(self) -> bytes:
-        """The record with its head."""
+    def record(self) -> bytes:
+        """The bytes of the record, with its head."""
         return self.raw[self.place.start : self.place.stop]
 
     @property
@@ -56,46 +55,46 @@ class Told(NamedTuple):
 
 
 @dataclass
-class Strict:
+class StrictLog:
     """What is in a file."""
 
-    #: Of the data section, then of the summary section.
+    #: Records of the data section, then of the summary section.
     records: list[Record] = field(default_factory=list)
-    #: Name, encoding and text by id; schema, topic and encoding of the messages by id.
+    #: By id of a schema: name, encoding, text. By id of a channel: schema's id, topic, encoding of the messages.
     schemas: dict[int, tuple[str, str, bytes]] = field(default_factory=dict)
     channels: dict[int, tuple[int, str, str]] = field(default_factory=dict)
-    messages: list[Told] = field(default_factory=list)
-    #: Messages by channel id as the summary's statistics promise them, and as the message indexes do.
-    promised: dict[int, int] = field(default_factory=dict)
+    messages: list[StrictMessage] = field(default_factory=list)
+    #: Number of messages by channel id, by the summary's statistics and by the message indexes.
+    counted: dict[int, int] = field(default_factory=dict)
     indexed: dict[int, int] = field(default_factory=dict)
 
     def chunks(self) -> list[Record]:
         return [record for record in self.records if record.code == CHUNK]
 
-    def of(self, *topics: str) -> list[Told]:
+    def of(self, *topics: str) -> list[StrictMessage]:
         ids = {number for number, (_, topic, _) in self.channels.items() if topic in topics}
-        return [told for told in self.messages if told.channel in ids]
+        return [message for message in self.messages if message.channel in ids]
 
 
 def records_in(data: bytes, at: int, stop: int) -> Iterator[Record]:
     """Hop from record to record, up to `stop` exactly."""
     while at < stop:
         if at + 9 > stop:
-            raise FaultError(f"half a record's head at {at}")
+            raise FaultError(f"a record's head is cut at {at}")
         code, length = struct.unpack_from("<BQ", data, at)
         if at + 9 + length > stop:
-            raise FaultError(f"record {code:#x} at {at} is longer than there is room")
+            raise FaultError(f"record {code:#x} at {at} is longer than its section")
         yield Record(code, at, at + 9 + length)
         at += 9 + length
 
 
-def walk(data: bytes) -> Strict:
+def walk(data: bytes) -> StrictLog:
     """Everything in a file.
 
     Raises:
-        FaultError: Its data section, its end or a CRC in it breaks the specification.
+        FaultError: The data section, the end of the file or a CRC breaks the specification.
     """
-    found = Strict()
+    found = StrictLog()
     try:
         _walk(data, found)
     except (struct.error, ValueError) as error:
@@ -104,7 +103,7 @@ def walk(data: bytes) -> Strict:
 
 
 def chunk_head(data: bytes) -> tuple[int, int, str, int, int]:
-    """Uncompressed size, CRC, compression, and first byte and number of the compressed bytes, of a chunk's contents."""
+    """Of a chunk's contents: uncompressed size, CRC, compression, first byte and number of the compressed bytes."""
     size, crc = struct.unpack_from("<QI", data, 16)
     compression, at = _text(data, 28)
     (count,) = struct.unpack_from("<Q", data, at)
@@ -112,10 +111,10 @@ def chunk_head(data: bytes) -> tuple[int, int, str, int, int]:
 
 
 def uncompressed(data: bytes) -> bytes:
-    """The records of a chunk by its contents.
+    """The records of a chunk, given its contents.
 
     Raises:
-        FaultError: They do not decompress, or size or CRC are others.
+        FaultError: They do not decompress, or size or CRC are wrong.
     """
     size, crc, compression, at, count = chunk_head(data)
     if at + count > len(data):
@@ -133,12 +132,12 @@ def uncompressed(data: bytes) -> bytes:
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise FaultError(f"a chunk does not decompress: {error}") from error
     if len(raw) != size or (crc and zlib.crc32(raw) != crc):
-        raise FaultError("a chunk has another size or CRC")
+        raise FaultError("the size or CRC of a chunk is wrong")
     return raw
 
 
-def unpacked(data: bytes) -> bytes:
-    """The MCAP bytes of a file that may be compressed as a whole.
+def decompressed(data: bytes) -> bytes:
+    """The MCAP bytes of a file, decompressed where it is a compressed file.
 
     Raises:
         FaultError: It does not decompress.
@@ -156,12 +155,12 @@ def unpacked(data: bytes) -> bytes:
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise FaultError(f"the compression is damaged: {error}") from error
     if found and data:
-        raise FaultError("something stands behind what is compressed")
+        raise FaultError("bytes stand behind the compressed frames")
     return found or data
 
 
 def metadata(data: bytes) -> tuple[str, dict[str, str]]:
-    """Name and entries of a metadata record by its contents."""
+    """Name and entries of a metadata record, given its contents."""
     name, at = _text(data, 0)
     (size,) = struct.unpack_from("<I", data, at)
     at, stop = at + 4, at + 4 + size
@@ -174,7 +173,7 @@ def metadata(data: bytes) -> tuple[str, dict[str, str]]:
     return name, dict(zip(texts[::2], texts[1::2], strict=True))
 
 
-def _walk(data: bytes, found: Strict) -> None:
+def _walk(data: bytes, found: StrictLog) -> None:
     if not data.startswith(MAGIC) or not data.endswith(MAGIC) or len(data) < 60:
         raise FaultError("no magic")
     tail = Record(FOOTER, len(data) - 37, len(data) - 8)
@@ -187,23 +186,23 @@ def _walk(data: bytes, found: Strict) -> None:
     found.records = list(records_in(data, 8, end))
     if found.records[0].code != HEADER or found.records[-1].code != DATA_END:
         raise FaultError("the data section lacks its header or its end")
-    _, at = _text(content := data[found.records[0].inside], 0)
+    _, at = _text(content := data[found.records[0].contents], 0)
     _text(content, at)
     for record in found.records[1:-1]:
         _take(data, record, found)
-    (crc,) = struct.unpack_from("<I", data[found.records[-1].inside])
+    (crc,) = struct.unpack_from("<I", data[found.records[-1].contents])
     if crc and crc != zlib.crc32(data[: found.records[-1].start]):
         raise FaultError("the CRC of the data is wrong")
-    for number in {told.channel for told in found.messages}:
+    for number in {message.channel for message in found.messages}:
         if number not in found.channels or found.channels[number][0] not in {0, *found.schemas}:
             raise FaultError(f"channel {number} or its schema is not defined")
     if summary_start and not (summary_crc and zlib.crc32(data[summary_start : tail.start + 25]) != summary_crc):
         _take_summary(data, summary_start, tail.start, found)
 
 
-def _take(data: bytes, record: Record, found: Strict) -> None:
-    """A record of the data section."""
-    content = data[record.inside]
+def _take(data: bytes, record: Record, found: StrictLog) -> None:
+    """Add a record of the data section."""
+    content = data[record.contents]
     if record.code == CHUNK:
         raw = uncompressed(content)
         for inner in records_in(raw, 0, len(raw)):
@@ -213,7 +212,7 @@ def _take(data: bytes, record: Record, found: Strict) -> None:
     elif record.code == INDEX:
         channel, size = struct.unpack_from("<HI", content)
         if size % 16 or 6 + size > len(content):
-            raise FaultError("a message index of another size")
+            raise FaultError("the size of a message index is wrong")
         found.indexed[channel] = found.indexed.get(channel, 0) + size // 16
     elif record.code == METADATA:
         metadata(content)
@@ -223,21 +222,21 @@ def _take(data: bytes, record: Record, found: Strict) -> None:
         raise FaultError(f"record {record.code:#x} in the data section")
 
 
-def _take_one(data: bytes, record: Record, found: Strict, chunk: Record | None) -> None:
-    """A schema, channel or message."""
+def _take_one(data: bytes, record: Record, found: StrictLog, chunk: Record | None) -> None:
+    """Add a schema, channel or message."""
     if record.code == MESSAGE:
         if record.stop - record.start < 31:
             raise FaultError("a message shorter than its head")
         channel, _, log_time_ns = struct.unpack_from("<HIQ", data, record.start + 9)
-        found.messages.append(Told(channel, _signed(log_time_ns), data, record, chunk))
+        found.messages.append(StrictMessage(channel, _signed(log_time_ns), data, record, chunk))
     elif record.code in {SCHEMA, CHANNEL}:
-        _define(record.code, data[record.inside], found.schemas, found.channels)
+        _define(record.code, data[record.contents], found.schemas, found.channels)
 
 
 def _define(
     code: int, content: bytes, schemas: dict[int, tuple[str, str, bytes]], channels: dict[int, tuple[int, str, str]]
 ) -> None:
-    """A schema or channel, which nothing may define in two ways."""
+    """Add a schema or channel, which no other record may define otherwise."""
     if code == SCHEMA:
         (number,) = struct.unpack_from("<H", content)
         name, at = _text(content, 2)
@@ -247,27 +246,27 @@ def _define(
             raise FaultError("a definition longer than its record")
         schema = name, encoding, content[at + 4 : at + 4 + size]
         if schemas.setdefault(number, schema) != schema:
-            raise FaultError(f"schema {number} is defined in two ways")
+            raise FaultError(f"schema {number} is defined twice, differently")
     else:
         number, schema_id = struct.unpack_from("<HH", content)
         topic, at = _text(content, 4)
         encoding, _ = _text(content, at)
         channel = schema_id, topic, encoding
         if channels.setdefault(number, channel) != channel:
-            raise FaultError(f"channel {number} is defined in two ways")
+            raise FaultError(f"channel {number} is defined twice, differently")
 
 
-def _take_summary(data: bytes, start: int, stop: int, found: Strict) -> None:
-    """What the summary says, up to its first fault."""
+def _take_summary(data: bytes, start: int, stop: int, found: StrictLog) -> None:
+    """Add the summary section, or nothing of it where it has a fault."""
     try:
         records = list(records_in(data, start, stop))
         for record in records:
-            content = data[record.inside]
+            content = data[record.contents]
             if record.code == STATISTICS:
                 (size,) = struct.unpack_from("<I", content, 42)
-                found.promised = dict(struct.iter_unpack("<HQ", content[46 : 46 + size]))
+                found.counted = dict(struct.iter_unpack("<HQ", content[46 : 46 + size]))
     except (FaultError, struct.error, ValueError):
-        found.promised = {}
+        found.counted = {}
         return
     found.records += records
 

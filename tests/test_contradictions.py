@@ -6,7 +6,7 @@ import struct
 import log_factory as forge
 import pytest
 import strict_log
-from test_log_file import FIELDS, damaged, wrenches_before
+from damaged_log import FIELDS, damaged, without_summary_crc, wrenches_before
 
 from navirl_cli.logs.container import records
 from navirl_cli.logs.messages.reader import message_times, read, scan
@@ -15,11 +15,6 @@ from navirl_cli.logs.messages.reader import message_times, read, scan
 @pytest.fixture
 def run(tmp_path):
     return forge.forge(tmp_path / "run.mcap", forge.run())
-
-
-def unsigned(path):
-    """The file without its summary's CRC, so that a changed summary is believed."""
-    return forge.overwrite(path, path.stat().st_size - 12, bytes(4))
 
 
 def records_of(path, code):
@@ -48,7 +43,7 @@ def test_a_message_that_its_index_names_and_that_is_gone_is_told(tmp_path):
     path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS["uncompressed chunks"])
     data = path.read_bytes()
     told = strict_log.walk(data).of("/wrench")[70]
-    forge.overwrite(path, data.index(told.whole) + records.HEAD_SIZE, b"\3")
+    forge.overwrite(path, data.index(told.record) + records.HEAD_SIZE, b"\3")
     (note,) = damaged(path, [*range(70), *range(71, 600)])
     assert re.search(r"(\d+) messages of /wrench in the chunk's message index, \d+ are there", note)
 
@@ -56,7 +51,7 @@ def test_a_message_that_its_index_names_and_that_is_gone_is_told(tmp_path):
 def test_statistics_that_do_not_add_up_are_not_believed(run):
     """The counts by channel may be left out, too."""
     at = records_of(run, records.STATISTICS)[0]
-    forge.overwrite(unsigned(run), at, struct.pack("<Q", 5000))
+    forge.overwrite(without_summary_crc(run), at, struct.pack("<Q", 5000))
     contents = scan(run)
     assert [contents.topic_count(topic) for topic in ("/wrench", "/odom", "/camera")] == [600, 60, 30]
     assert damaged(run, slice(None)) == []
@@ -64,7 +59,7 @@ def test_statistics_that_do_not_add_up_are_not_believed(run):
 
 def test_chunks_that_stand_in_each_other_spoil_the_summary(run):
     at = records_of(run, records.CHUNK_INDEX)[1]
-    forge.overwrite(unsigned(run), at + 24, struct.pack("<Q", 100_000))
+    forge.overwrite(without_summary_crc(run), at + 24, struct.pack("<Q", 100_000))
     (note,) = damaged(run, slice(None))
     assert "the summary section is damaged and was not used; no message is lost" in note
 
@@ -91,14 +86,14 @@ def test_names_that_cannot_be_printed_are_escaped(tmp_path):
 def test_an_index_of_metadata_that_points_nowhere(tmp_path, offset):
     path = forge.forge(tmp_path / "run.mcap", forge.run(), metadata=[("session", {"a": "1"})])
     (at,) = records_of(path, 0x0D)
-    forge.overwrite(unsigned(path), at, struct.pack("<Q", offset))
+    forge.overwrite(without_summary_crc(path), at, struct.pack("<Q", offset))
     assert scan(path).metadata == {"session": ({"a": "1"},)}
 
 
 @pytest.mark.parametrize("place", [2**64 - 1, 2**63, 0, 100])
 def test_a_chunk_index_that_points_to_no_message_index(run, place):
     at = records_of(run, records.CHUNK_INDEX)[1]
-    forge.overwrite(unsigned(run), at + 32 + 4 + 2, struct.pack("<Q", place))
+    forge.overwrite(without_summary_crc(run), at + 32 + 4 + 2, struct.pack("<Q", place))
     assert damaged(run, slice(None)) == []
     assert message_times(run)[0].topic_count("/wrench") == 600
 

@@ -1,4 +1,4 @@
-"""Every way in which a minute of log was seen to break: what is still read of it, bit by bit, and what is said."""
+"""Damage of every form: what is still read of a minute of log, bit by bit, and what is reported."""
 
 import io
 import re
@@ -17,9 +17,9 @@ from minute_log import (
     body,
     check,
     fewest,
+    intact,
     lost_in,
     overwritten,
-    sound,
 )
 
 from navirl_cli.errors import LogError
@@ -37,24 +37,24 @@ def path(tmp_path):
 
 
 def test_the_twin_reads_as_mcap_does():
-    log = sound("zstd")
+    log = intact("zstd")
     assert len(log.wanted) == ALL
     assert all(log.strict.channels[number][1] == topic for topic, number in CHANNELS.items())
     assert 58 <= len(log.chunks) <= 62
     messages = NonSeekingReader(io.BytesIO(log.data)).iter_messages(topics=list(TRUTH), log_time_order=False)
     assert [(message.log_time, message.data) for _, _, message in messages] == [
-        (told.log_time_ns, told.payload) for told in log.wanted
+        (message.log_time_ns, message.payload) for message in log.wanted
     ]
 
 
-@pytest.mark.parametrize("way", OPTIONS)
-def test_what_is_sound_is_read_whole(path, way):
-    check(path, sound(way).data, sound(way).wanted)
+@pytest.mark.parametrize("variant", OPTIONS)
+def test_an_intact_file_is_read_without_damage(path, variant):
+    check(path, intact(variant).data, intact(variant).wanted)
 
 
-@pytest.mark.parametrize("way", ["zstd", "zstd, no summary", "lz4", "unchecked", "unchecked, no summary"])
-def test_cut_in_a_chunk(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary", "lz4", "unchecked", "unchecked, no summary"])
+def test_cut_in_a_chunk(path, variant):
+    log = intact(variant)
     cut = log.cut_behind(20_022)
     number = log.chunk_of(20_022)
     chunk = log.chunks[number]
@@ -66,9 +66,9 @@ def test_cut_in_a_chunk(path, way):
     check(path, log.data[:cut], kept, (chunk.start, cut, log.span(number), reason))
 
 
-@pytest.mark.parametrize("way", ["zstd", "unchecked"])
-def test_cut_in_an_index_record(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "unchecked"])
+def test_cut_in_an_index_record(path, variant):
+    log = intact(variant)
     number = log.chunk_of(20_242)
     chunk = log.chunks[number]
     cut = chunk.stop + 15
@@ -79,9 +79,9 @@ def test_cut_in_an_index_record(path, way):
     check(path, log.data[:cut], kept, (chunk.stop, cut, (log.latest_s(cut), None), reason))
 
 
-@pytest.mark.parametrize("way", OPTIONS)
-def test_the_last_bytes_are_lost(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", OPTIONS)
+def test_the_last_bytes_are_lost(path, variant):
+    log = intact(variant)
     data = log.data[:-20]
     end = next(record for record in log.strict.records if record.code == strict_log.DATA_END)
     check(
@@ -92,9 +92,9 @@ def test_the_last_bytes_are_lost(path, way):
     )
 
 
-@pytest.mark.parametrize("way", ["zstd", "zstd, no summary", "unchecked"])
-def test_a_tail_of_zeros(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary", "unchecked"])
+def test_a_tail_of_zeros(path, variant):
+    log = intact(variant)
     number = log.chunk_of(19_692) + 1
     chunk, size = log.chunks[number], len(log.data)
     kept = log.before(chunk.start)
@@ -103,10 +103,10 @@ def test_a_tail_of_zeros(path, way):
     check(path, log.data[: chunk.start] + bytes(size - chunk.start), kept, note)
 
 
-@pytest.mark.parametrize("way", ["zstd", "zstd, no summary", "lz4"])
-def test_zeros_from_within_a_chunk_that_is_compressed(path, way):
-    """Nobody knows how far a chunk can be trusted that does not decompress."""
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary", "lz4"])
+def test_zeros_from_within_a_chunk_that_is_compressed(path, variant):
+    """Nothing of a chunk that does not decompress can be trusted."""
+    log = intact(variant)
     number = log.chunk_of(19_692) + 1
     chunk, size = log.chunks[number], len(log.data)
     kept = log.before(chunk.start)
@@ -124,9 +124,9 @@ def test_zeros_from_within_a_chunk_that_is_compressed(path, way):
     )
 
 
-@pytest.mark.parametrize("way", ["unchecked", "unchecked, no summary"])
-def test_zeros_from_within_a_chunk_that_is_not_compressed(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["unchecked", "unchecked, no summary"])
+def test_zeros_from_within_a_chunk_that_is_not_compressed(path, variant):
+    log = intact(variant)
     number = log.chunk_of(20_000)
     chunk, size, first = log.chunks[number], len(log.data), log.wanted[20_000]
     last = log.strict.messages[log.strict.messages.index(first) - 1]
@@ -144,34 +144,34 @@ def test_zeros_from_within_a_chunk_that_is_not_compressed(path, way):
     )
 
 
-@pytest.mark.parametrize("way", ["zstd", "zstd, no summary"])
-def test_a_bad_chunk_in_the_middle(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary"])
+def test_a_bad_chunk_in_the_middle(path, variant):
+    log = intact(variant)
     number = fewest(log)
     chunk = log.chunks[number]
     kept = log.without(log.inside(number))
     assert len(kept) >= 32_450
     data = overwritten(log, chunk.start + 50_000, b"\xff" * 150_000)
-    reason = rf"the chunk does not decompress \(zstd: .*\); {lost_in(log, number, way)}"
+    reason = rf"the chunk does not decompress \(zstd: .*\); {lost_in(log, number, variant)}"
     check(path, data, kept, (chunk.start, log.end(number), log.span(number), reason))
 
 
-@pytest.mark.parametrize("way", ["zstd", "zstd, no summary", "lz4"])
-def test_a_wrong_chunk_crc(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary", "lz4"])
+def test_a_wrong_chunk_crc(path, variant):
+    log = intact(variant)
     number = fewest(log)
     chunk = log.chunks[number]
-    crc = strict_log.chunk_head(log.data[chunk.inside])[1]
+    crc = strict_log.chunk_head(log.data[chunk.contents])[1]
     data = overwritten(log, chunk.start + 9 + 24, b"\1\2\3\4")
-    reason = rf"the chunk's CRC is {crc:#010x}, expected 0x04030201; {lost_in(log, number, way)}"
+    reason = rf"the chunk's CRC is {crc:#010x}, expected 0x04030201; {lost_in(log, number, variant)}"
     kept = log.without(log.inside(number))
     assert len(kept) >= 32_450
     check(path, data, kept, (chunk.start, log.end(number), log.span(number), reason))
 
 
-@pytest.mark.parametrize("way", ["unchunked", "unchunked, no summary"])
-def test_unchunked_and_cut_at_60_per_cent(path, way):
-    log = sound(way)
+@pytest.mark.parametrize("variant", ["unchunked", "unchunked, no summary"])
+def test_unchunked_and_cut_at_60_per_cent(path, variant):
+    log = intact(variant)
     cut = log.wanted[19_802].place.start + 50
     assert cut / len(log.data) == pytest.approx(0.6, abs=0.002)
     kept = log.before(cut)
@@ -182,8 +182,8 @@ def test_unchunked_and_cut_at_60_per_cent(path, way):
 
 
 def test_no_message_index(path):
-    check(path, sound("no message index").data, sound("no message index").wanted)
-    assert not sound("no message index").strict.indexed
+    check(path, intact("no message index").data, intact("no message index").wanted)
+    assert not intact("no message index").strict.indexed
 
 
 @pytest.mark.parametrize(
@@ -204,13 +204,13 @@ def test_no_message_index(path):
 )
 @pytest.mark.parametrize("use", [scan, message_times, lambda path: read(path, WANTS), load_recording])
 def test_only_the_magic_or_cut_in_the_header(path, size, message, use):
-    path.write_bytes(sound("zstd").data[:size])
+    path.write_bytes(intact("zstd").data[:size])
     with pytest.raises(LogError, match=f"^{re.escape(str(path))}: {message}"):
         use(path)
 
 
 def test_nothing_but_the_header(path):
-    path.write_bytes(sound("zstd").data[: sound("zstd").chunks[0].start])
+    path.write_bytes(intact("zstd").data[: intact("zstd").chunks[0].start])
     (note,) = scan(path).damage
     assert note.reason == "the file ends without its closing records; all that it holds was read"
     with pytest.raises(LogError, match=r"minute.mcap: holds no messages: the file ends before the first one; copy it"):

@@ -42,7 +42,7 @@ ORDERS = {
         ["log_file"],
     ],
     "navirl_cli.logs.messages": [["__init__", "schema"], ["layout"], ["decode", "writer"], ["series"], ["reader"]],
-    "navirl_cli.logs.tf": [["__init__", "transforms"], ["tree"]],
+    "navirl_cli.logs.tf": [["__init__", "rotations"], ["transforms"], ["tree"]],
 }
 
 
@@ -105,7 +105,7 @@ def test_the_reading_of_imports_sees_them():
     assert imported_rooms(ast.parse(text), "navirl_cli.logs") == {"load", "recording", "tf"}
 
 
-def test_only_figures_know_matplotlib_and_only_the_command_line_knows_click():
+def test_only_figures_know_matplotlib_only_the_command_line_knows_click_and_logs_know_no_scipy():
     for path in PACKAGE.rglob("*.py"):
         modules = {
             (node.module or "").split(".")[0] if isinstance(node, ast.ImportFrom) else node.names[0].name.split(".")[0]
@@ -116,3 +116,6 @@ def test_only_figures_know_matplotlib_and_only_the_command_line_knows_click():
             assert "matplotlib" not in modules, path
         if room_of(path) not in {"cli", "commands"}:
             assert "click" not in modules, path
+        if room_of(path) == "logs":
+            # importing it takes longer than reading a small log
+            assert "scipy" not in modules, path

@@ -5,29 +5,13 @@ import struct
 from itertools import pairwise
 
 import log_factory as forge
-import numpy as np
 import pytest
+from damaged_log import FIELDS, damaged, wrenches_before
 from mcap.writer import CompressionType
 
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.log_file import LogFile
 from navirl_cli.logs.messages.reader import read, scan
-
-FIELDS = ("header.stamp", "wrench.force.x")
-
-
-def damaged(path, expected):
-    """Read the wrenches, which must be the expected ones of the run's, and return the damage as texts."""
-    result = read(path, {"/wrench": FIELDS})
-    all_times = forge.START_NS + np.arange(600) * 2_000_000
-    assert result.series["/wrench"].log_time_ns.tolist() == all_times[expected].tolist()
-    assert (result.series["/wrench"].columns["header.stamp"] == all_times[expected] - 10**6).all()
-    assert scan(path).counts is not None
-    return [str(note) for note in result.damage]
-
-
-def wrenches_before(path, chunk):
-    return sum(forge.messages_in_chunk(path, number, "/wrench") for number in range(chunk))
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from log_factory import Message
 
 from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.roles.plausible import FORCES, PLACES, Limits, plausible_messages
-from navirl_cli.logs.tf.transforms import Curve, Link, are_rotations
+from navirl_cli.logs.tf.rotations import are_rotations
+from navirl_cli.logs.tf.transforms import Curve, Link
 
 NONE = (float("nan"), float("inf"), float("-inf"), 1e300, -2e5)
 

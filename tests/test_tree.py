@@ -578,7 +578,7 @@ def pairs_of(tree, seed, most=6):
 
 def four(transforms):
     result = np.tile(np.eye(4), (len(transforms.translation_m), 1, 1))
-    result[:, :3, :3], result[:, :3, 3] = transforms.rotation.as_matrix(), transforms.translation_m
+    result[:, :3, :3], result[:, :3, 3] = transforms.matrices, transforms.translation_m
     return result
 
 

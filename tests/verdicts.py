@@ -1,17 +1,17 @@
-"""What reading a broken log may come to, and what it may never.
+"""What reading a broken log may come to, and what it may never come to.
 
-A broken log may be refused by one line, or be read with its damage told. Where neither happens, what was read must be
+A broken log may be refused in one line, or be read with its damage reported. Where neither happens, what was read must
+be one of these:
 
-- what the sound log holds: the mutation hit what nobody needs, or what the file says twice; or
-- what the strict twin reads in the broken file (`strict_log`), which knows no index, goes on behind no fault and checks
-  every CRC. Then the file is sound, but another one: its topic has another name, a record was taken out whole, or a
-  payload has other bytes that no CRC protects. Nothing in it may promise more messages than were read, neither its
-  statistics nor its message indexes; or
-- in a file that the twin refuses, what the sound log holds, but for messages that no CRC protects and whose own bytes
-  were hit; as many as before must be there.
+- What the intact log holds. The mutation hit bytes that are not needed, or that the file states twice.
+- What the strict twin (`strict_log`) reads in the broken file. It uses no index, stops at the first fault and checks
+  every CRC, so the file is intact but another one: a topic has another name, a record is missing, or a payload that no
+  CRC protects has other bytes. Neither the statistics nor the message indexes may count more messages than were read.
+- In a file that the twin refuses: what the intact log holds, except for messages that no CRC protects and whose own
+  bytes were hit. The number of messages must be the same.
 
-Everything else is a silently shortened or changed result. A recording must tell what reading its topics tells, and be
-that of the sound log where all topics are. A topic whose type was changed is another topic for a recording.
+Everything else is a result that was shortened or changed in silence. A recording must report what reading its topics
+reports, and must equal that of the intact log where all topics do. A topic whose type was changed is another topic.
 """
 
 from collections import Counter
@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 import strict_log
-from log_rows import Kind, Row, counts_of, rows_of, same_recordings, same_series, slow_columns
+from log_rows import MessageType, Row, counts_of, rows_of, same_recordings, same_series, slow_columns
 from mutations import Mutant
-from small_logs import Base, packed
+from small_logs import IntactLog
 
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.errors import NavirlError
@@ -45,7 +45,7 @@ def pose(path: str) -> tuple[str, ...]:
 
 
 LINK = (*STAMP, "child_frame_id", *fields("transform.translation"), *fields("transform.rotation", "xyzw"))
-#: What is read of every log: all that an extraction needs.
+#: The fields that are read of every log: all that an extraction needs.
 WANTS = {
     "/wrench": (*STAMP, *fields("wrench.force")),
     "/odom": (*STAMP, "child_frame_id", *pose("pose.pose"), *fields("twist.twist.linear", "xy")),
@@ -58,120 +58,119 @@ WANTS = {
 
 
 class ForbiddenError(Exception):
-    """Something came out that never may; the message says what."""
+    """Something came of a broken log that never may; the message says what."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is in a sound log."""
+    """What is in an intact log."""
 
-    base: Base
+    log: IntactLog
     #: Columns by topic, their rows, and the row of each payload.
     series: dict[str, Series]
     rows: dict[str, list[Row]]
     by_payload: dict[tuple[str, bytes], tuple[bytes, ...]]
-    #: Schema and encoding of the messages by topic.
-    kinds: dict[str, Kind]
+    #: By topic.
+    types: dict[str, MessageType]
     counts: Counter[tuple[str, str]]
     recording: Recording
 
 
-def in_order(base: Base, topic: str) -> list[strict_log.Told]:
+def in_order(log: IntactLog, topic: str) -> list[strict_log.StrictMessage]:
     """A topic's messages by time of receipt."""
-    return sorted(base.strict.of(topic), key=lambda told: told.log_time_ns)
+    return sorted(log.strict.of(topic), key=lambda message: message.log_time_ns)
 
 
-#: Calls a function under a name, and returns what it returns, or the known trouble that it raises.
+#: Calls a function under a name, and returns what it returns, or the expected error that it raises.
 Call = Callable[[str, Callable[[], Any]], Any]
 
 
-def truth_of(base: Base, folder: Path) -> Truth:
-    """Read a sound log; the strict twin must agree."""
-    path = folder / "sound.mcap"
-    path.write_bytes(packed(base.data, base.packing))
+def truth_of(log: IntactLog, folder: Path) -> Truth:
+    """Read an intact log; the strict twin must agree."""
+    path = folder / "intact.mcap"
+    path.write_bytes(log.stored)
     result, recording = read(path, WANTS), load_recording(path)
-    assert not result.damage, base.name
-    assert not recording.damage, base.name
-    assert len(extract(recording, ExtractSettings()).demonstrations) == 1, base.name
+    assert not result.damage, log.name
+    assert not recording.damage, log.name
+    assert len(extract(recording, ExtractSettings()).demonstrations) == 1, log.name
     rows = {topic: rows_of(series) for topic, series in result.series.items()}
-    kinds = dict(kind_of(number, base.strict) for number in base.strict.channels)
-    truth = Truth(base, result.series, rows, {}, kinds, counts_of(scan(path)), recording)
-    assert rows == expected_rows(truth, base.strict, result.series), base.name
+    types = dict(type_of(number, log.strict) for number in log.strict.channels)
+    truth = Truth(log, result.series, rows, {}, types, counts_of(scan(path)), recording)
+    assert rows == expected_rows(truth, log.strict, result.series), log.name
     for topic, found in rows.items():
-        for told, (_, columns) in zip(in_order(base, topic), found, strict=True):
-            truth.by_payload[topic, told.payload] = columns
+        for message, (_, columns) in zip(in_order(log, topic), found, strict=True):
+            truth.by_payload[topic, message.payload] = columns
     return truth
 
 
 def plain_call(name: str, work: Callable[[], Any]) -> Any:
-    """Call a function that may find known trouble.
+    """Call a function that may raise an expected error; return its result, or that error.
 
     Raises:
-        ForbiddenError: The trouble is not told in one line.
+        ForbiddenError: The error's message is not one line.
     """
     try:
         return work()
     except NavirlError as error:
         if not str(error).strip() or "\n" in str(error):
-            raise ForbiddenError(f"{name}: an error that is no line: {str(error)!r}") from error
+            raise ForbiddenError(f"{name}: an error message that is not one line: {str(error)!r}") from error
         return error
 
 
 def judge(mutant: Mutant, truth: Truth, path: Path, call: Call = plain_call) -> str:
-    """Read a broken log in every way.
+    """Read a broken log by every function that reads logs.
 
     Args:
         mutant: The log.
-        truth: What it was.
-        path: Where it is written to.
-        call: Stands between, to measure.
+        truth: What is in the intact log.
+        path: Where the broken log is written.
+        call: Calls each function; measures it, where wished.
 
     Returns:
-        The kind of what came out.
+        The outcome: "refused", "damage reported", "as before", "another log" or "payloads hit".
 
     Raises:
-        ForbiddenError: Something came out that never may.
+        ForbiddenError: Something came of it that never may.
     """
     path.write_bytes(mutant.data)
     contents = call("scan", lambda: scan(path))
-    # which calls message_times
+    # overview calls message_times
     view = call("overview", lambda: overview(Source(path.name, (path,)), {}, check=True))
     result = call("read", lambda: read(path, WANTS))
     recording = call("load_recording", lambda: load_recording(path))
     if isinstance(recording, Recording) and mutant.number % 4 == 0:
         call("extract", lambda: extract(recording, ExtractSettings()))
     if isinstance(result, NavirlError):
-        # nothing can be had from such a file
         if not isinstance(recording, NavirlError):
-            raise ForbiddenError("load_recording takes what read refuses")
+            raise ForbiddenError("load_recording accepts what read refuses")
         return "refused"
-    kind = told_or_right(mutant, truth, result)
-    if kind != "damage told":
+    outcome = reported_or_right(mutant, truth, result)
+    if outcome != "damage reported":
         check_counts(mutant, truth, view)
     if isinstance(recording, Recording) and not recording.damage:
         counts = counts_of(contents)
-        if kind == "damage told":
+        if outcome == "damage reported":
             alike = {
                 topic: WANTS[topic] for topic, type_name in truth.counts if counts[topic, type_name] and topic in WANTS
             }
             # of maps only the latest matters
             if damage := read(path, alike, latest=("/map",)).damage:
-                raise ForbiddenError(f"load_recording does not tell: {damage[0]}")
-        elif kind == "as before" and counts == truth.counts and not same_recordings(recording, truth.recording):
-            raise ForbiddenError("the columns are those of the sound log, the recording is not")
-    return kind
+                raise ForbiddenError(f"load_recording does not report: {damage[0]}")
+        elif outcome == "as before" and counts == truth.counts and not same_recordings(recording, truth.recording):
+            raise ForbiddenError("the columns are those of the intact log, the recording is not")
+    return outcome
 
 
-def told_or_right(mutant: Mutant, truth: Truth, result: ReadResult) -> str:
-    """The kind of a result; it must be right where no damage is told."""
+def reported_or_right(mutant: Mutant, truth: Truth, result: ReadResult) -> str:
+    """The outcome of reading; what was read must be right where no damage is reported."""
     if result.damage:
-        return "damage told"
+        return "damage reported"
     if same_series(result.series, truth.series):
         return "as before"
     rows = {topic: found for topic, series in result.series.items() if (found := rows_of(series))}
     data = b""
     try:
-        data = strict_log.unpacked(mutant.data)
+        data = strict_log.decompressed(mutant.data)
         strict = strict_log.walk(data)
     except strict_log.FaultError as fault:
         check_hits(truth, rows, data, fault)
@@ -181,31 +180,31 @@ def told_or_right(mutant: Mutant, truth: Truth, result: ReadResult) -> str:
         raise ForbiddenError(f"the strict twin reads otherwise: {differences(rows, right)}")
     for number, (_, topic, _) in strict.channels.items():
         found = len(rows.get(topic, ()))
-        for source, counts in (("statistics", strict.promised), ("message indexes", strict.indexed)):
+        for source, counts in (("statistics", strict.counted), ("message indexes", strict.indexed)):
             if topic in WANTS and found < min(counts.get(number, 0), len(truth.rows.get(topic, ()))):
-                raise ForbiddenError(f"the {source} promise {counts[number]} messages of {topic}, {found} were read")
+                raise ForbiddenError(f"the {source} count {counts[number]} messages of {topic}, {found} were read")
     return "another log"
 
 
 def check_hits(truth: Truth, rows: dict[str, list[Row]], data: bytes, fault: strict_log.FaultError) -> None:
-    """Check that of a faulty file only messages changed that no CRC protects and that stand nowhere as they were."""
-    for topic, sound in truth.rows.items():
-        missing = Counter(sound) - Counter(rows.get(topic, ()))
-        gone = [told for told, row in zip(in_order(truth.base, topic), sound, strict=True) if row in missing]
-        unhit = [told for told in gone if truth.base.protected or told.whole in data]
-        if unhit or len(rows.get(topic, ())) < len(sound):
+    """Check that only those messages of a faulty file differ that no CRC protects and whose bytes were hit."""
+    for topic, intact in truth.rows.items():
+        missing = Counter(intact) - Counter(rows.get(topic, ()))
+        gone = [message for message, row in zip(in_order(truth.log, topic), intact, strict=True) if row in missing]
+        not_hit = [message for message in gone if truth.log.protected or message.record in data]
+        if not_hit or len(rows.get(topic, ())) < len(intact):
             raise ForbiddenError(f"{len(gone)} messages of {topic} are lost or changed; {fault}")
 
 
 def check_counts(mutant: Mutant, truth: Truth, view: Any) -> None:
-    """Where no damage is told, as many messages are counted as there are."""
+    """Check that the overview counts as many messages as the log holds where no damage is reported."""
     if isinstance(view, NavirlError) or view.damage or view.contents[0].damage:
         return
     found = {topic: view.contents[0].topic_count(topic) for topic in WANTS}
     if found == {topic: len(truth.rows.get(topic, ())) for topic in WANTS}:
         return
     try:
-        strict = strict_log.walk(strict_log.unpacked(mutant.data))
+        strict = strict_log.walk(strict_log.decompressed(mutant.data))
     except strict_log.FaultError as fault:
         raise ForbiddenError(f"the overview counts {found}; {fault}") from fault
     right = {topic: len(strict.of(topic)) for topic in WANTS}
@@ -215,36 +214,36 @@ def check_counts(mutant: Mutant, truth: Truth, view: Any) -> None:
 
 def differences(rows: dict[str, list[Row]], right: dict[str, list[Row]]) -> str:
     """Where rows differ from what they should be."""
-    told = []
+    texts = []
     for topic in sorted({*rows, *right}):
         extra = Counter(rows.get(topic, ())) - Counter(right.get(topic, ()))
         missing = Counter(right.get(topic, ())) - Counter(rows.get(topic, ()))
         if rows.get(topic) != right.get(topic):
-            told.append(f"{topic}: {extra.total()} wrong, {missing.total()} missing of {len(right.get(topic, ()))}")
-    return "; ".join(told)
+            texts.append(f"{topic}: {extra.total()} wrong, {missing.total()} missing of {len(right.get(topic, ()))}")
+    return "; ".join(texts)
 
 
-def expected_rows(truth: Truth, strict: strict_log.Strict, series: Mapping[str, Series]) -> dict[str, list[Row]]:
-    """Rows by topic as the strict twin has them.
+def expected_rows(truth: Truth, strict: strict_log.StrictLog, series: Mapping[str, Series]) -> dict[str, list[Row]]:
+    """Rows by topic as the strict twin reads them.
 
     Args:
-        truth: The sound log.
-        strict: The broken one, as the twin has it.
-        series: What was read, whose types of columns are taken.
+        truth: What is in the intact log.
+        strict: The broken log, as the twin reads it.
+        series: What was read; gives the types of the columns.
     """
     found: dict[str, list[Row]] = {}
-    kinds = {number: kind_of(number, strict) for number in strict.channels}
-    for told in strict.messages:
-        topic, kind = kinds[told.channel]
+    types = {number: type_of(number, strict) for number in strict.channels}
+    for message in strict.messages:
+        topic, own_type = types[message.channel]
         if topic in WANTS:
-            columns = truth.by_payload.get((topic, told.payload)) if kind == truth.kinds.get(topic) else None
+            columns = truth.by_payload.get((topic, message.payload)) if own_type == truth.types.get(topic) else None
             if columns is None and topic in series:
-                columns = slow_columns(kind, told.payload, WANTS[topic], series[topic])
-            found.setdefault(topic, []).append((told.log_time_ns, columns or ()))
+                columns = slow_columns(own_type, message.payload, WANTS[topic], series[topic])
+            found.setdefault(topic, []).append((message.log_time_ns, columns or ()))
     return {topic: sorted(rows, key=lambda row: row[0]) for topic, rows in found.items()}
 
 
-def kind_of(number: int, strict: strict_log.Strict) -> tuple[str, Kind]:
-    """Topic and definition of a channel."""
+def type_of(number: int, strict: strict_log.StrictLog) -> tuple[str, MessageType]:
+    """Topic and message type of a channel."""
     schema_id, topic, encoding = strict.channels[number]
     return topic, (*strict.schemas.get(schema_id, ("", "", b"")), encoding)

@@ -12,6 +12,8 @@ from navirl_cli.logs.roles.clocks import NS_PER_S
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
 from navirl_cli.logs.roles.plausible import PLACES
+from navirl_cli.logs.tf.rotations import are_rotations, normalised
+from navirl_cli.logs.tf.transforms import Transforms
 
 #: Gaps of tf that are longer are not interpolated over, ns.
 GAP_NS: Final = 5 * NS_PER_S
@@ -55,10 +57,6 @@ def poses_of(columns: Columns | None, context: Context) -> Poses:
     """
     if columns is None:
         return _from_tf(context)
-    from scipy.spatial.transform import Rotation
-
-    from navirl_cli.logs.tf.transforms import Transforms, are_rotations
-
     columns, frame = context.in_one_frame(columns)
     rotations = are_rotations(columns.stacked(*_ROTATION))
     columns = context.plausible(columns, PLACES, *_POSITION, rotations=rotations)
@@ -69,7 +67,7 @@ def poses_of(columns: Columns | None, context: Context) -> Poses:
     rows = rows[_covered(columns.topic, base, stamps[rows], frame, context)]
     t_ns = stamps[rows]
     columns = columns.rows(rows)
-    poses = Transforms(Rotation.from_quat(columns.stacked(*_ROTATION)), columns.stacked(*_POSITION))
+    poses = Transforms(normalised(columns.stacked(*_ROTATION)), columns.stacked(*_POSITION))
     into = context.tree.lookup(context.fixed, frame, t_ns)
     placed = into.after(poses)
     jumps = _leaps(t_ns, poses.translation_m[:, :2])

@@ -46,7 +46,7 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
             f"{context.log}: the wrench is given in frame {frame!r}: {error}; or say with `wrench_frame` which frame "
             "its axes are parallel to"
         ) from error
-    turns = mounted.rotation.as_matrix()
+    turns = mounted.matrices
     if span is not None:
         context.note(f"the wrench's frame {frame!r} moves on {base!r}; the handle's weight may not cancel out")
     return Wrench(t_ns, force, turns[0] if span is None else turns)

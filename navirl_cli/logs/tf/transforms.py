@@ -10,18 +10,16 @@ from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError
+from navirl_cli.logs.tf.rotations import IDENTITY, INVERSE, are_rotations, matrices, normalised, product, rotate, slerp
 
 #: First and last time, ns.
 Span = tuple[int, int]
 
 #: Before and after all stamps, ns.
 ALWAYS: Final[Span] = (int(np.iinfo(np.int64).min), int(np.iinfo(np.int64).max))
-#: Lengths of quaternions that are taken: digits may have been rounded away, but a damaged one has no direction.
-_LENGTHS: Final = (0.9, 1.1)
 #: No frame's origin is further away, in m; a damaged number may be.
 _FARTHEST_M: Final = 1e9
 
@@ -61,17 +59,22 @@ class Link:
 class Transforms:
     """Transforms of points from a source frame into a target frame, one for each time."""
 
-    #: n rotations.
-    rotation: Rotation
+    #: Rotations of the source frame in the target frame, unit quaternions x, y, z, w, shape (n, 4).
+    quaternion: FloatArray
     #: Origin of the source frame in the target frame, m, shape (n, 3).
     translation_m: FloatArray
 
     @property
     def yaw_rad(self) -> FloatArray:
         """Heading of the source frame's x axis in the target frame's x-y plane, in (-pi, pi], shape (n,)."""
-        axis = self.rotation.apply((1.0, 0.0, 0.0))
+        axis = rotate(self.quaternion, (1.0, 0.0, 0.0))
         yaw: FloatArray = np.arctan2(axis[:, 1], axis[:, 0])
         return yaw
+
+    @property
+    def matrices(self) -> FloatArray:
+        """Rotation matrices, whose columns are the source frame's axes in the target frame, shape (n, 3, 3)."""
+        return matrices(self.quaternion)
 
     def apply(self, points_m: ArrayLike) -> FloatArray:
         """Points of the source frame in the target frame.
@@ -82,17 +85,16 @@ class Transforms:
         Returns:
             Shape (n, 3), m.
         """
-        rotated: FloatArray = self.rotation.apply(np.asarray(points_m, dtype=np.float64))
-        return rotated + self.translation_m
+        return rotate(self.quaternion, points_m) + self.translation_m
 
     def inverse(self) -> "Transforms":
         """The transforms from the target frame into the source frame."""
-        back = self.rotation.inv()
-        return Transforms(back, -back.apply(self.translation_m))
+        back = self.quaternion * INVERSE
+        return Transforms(back, -rotate(back, self.translation_m))
 
     def after(self, first: "Transforms") -> "Transforms":
         """The transforms that apply `first` and then these."""
-        return Transforms(self.rotation * first.rotation, self.apply(first.translation_m))
+        return Transforms(product(self.quaternion, first.quaternion), self.apply(first.translation_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +107,8 @@ class Curve:
     t_ns: IntArray
     #: Shape (k, 3), m.
     translation_m: FloatArray
-    #: k rotations.
-    rotation: Rotation
-    #: Rotation vectors from each rotation to the next, in the child's axes; the last is zero; shape (k, 3).
-    turn_rad: FloatArray
+    #: Unit quaternions x, y, z, w, shape (k, 4).
+    quaternion: FloatArray
     fixed: bool
 
     @classmethod
@@ -135,9 +135,8 @@ class Curve:
             return None, len(good)
         rows = rows[-1:] if fixed else rows[np.argsort(t_ns[rows], kind="stable")]
         rows = rows[np.append(np.diff(t_ns[rows]) > 0, True)]
-        rotation = Rotation.from_quat(quaternion[rows])
-        turn = np.append((rotation[:-1].inv() * rotation[1:]).as_rotvec(), np.zeros((1, 3)), axis=0)
-        return cls(parent, child, t_ns[rows], translation[rows], rotation, turn, fixed), int((~good).sum())
+        curve = cls(parent, child, t_ns[rows], translation[rows], normalised(quaternion[rows]), fixed)
+        return curve, int((~good).sum())
 
     @property
     def span(self) -> Span:
@@ -155,9 +154,10 @@ class Curve:
         after = np.minimum(rows + 1, len(self.t_ns) - 1)
         # differences first: nanoseconds since 1970 do not fit into a float
         step = np.maximum(self.t_ns[after] - self.t_ns[rows], 1)
-        share = np.where(self.t_ns[after] <= until, np.clip((times - self.t_ns[rows]) / step, 0.0, 1.0), 0.0)[:, None]
-        translation = (1.0 - share) * self.translation_m[rows] + share * self.translation_m[after]
-        return Transforms(self.rotation[rows] * Rotation.from_rotvec(share * self.turn_rad[rows]), translation)
+        share = np.where(self.t_ns[after] <= until, np.clip((times - self.t_ns[rows]) / step, 0.0, 1.0), 0.0)
+        line = share[:, None]
+        translation = (1.0 - line) * self.translation_m[rows] + line * self.translation_m[after]
+        return Transforms(slerp(self.quaternion[rows], self.quaternion[after], share), translation)
 
     def gaps(self, times: IntArray, until: IntArray) -> IntArray:
         """Distance in ns between the stamps around each time, or to the only one; 0 on a stamp; shape (n,)."""
@@ -280,17 +280,9 @@ def beyond(times: IntArray, span: Span, hold_ns: int = 0) -> BoolArray:
     return (times < span[0] - hold_ns) | (times > span[1] + hold_ns)
 
 
-def are_rotations(quaternion: FloatArray) -> BoolArray:
-    """Which quaternions of shape (k, 4) are rotations, shape (k,): those of length 1, but for rounded digits."""
-    # clipped, since the square of a damaged number may be too large for a float
-    length = np.linalg.norm(np.clip(quaternion, -2.0, 2.0), axis=1)
-    rotations: BoolArray = (length > _LENGTHS[0]) & (length < _LENGTHS[1])
-    return rotations
-
-
 def _chain(steps: Steps, times: IntArray) -> Transforms:
     """The transforms up a chain of curves."""
-    poses = Transforms(Rotation.from_quat(np.tile((0.0, 0.0, 0.0, 1.0), (len(times), 1))), np.zeros((len(times), 3)))
+    poses = Transforms(np.tile(IDENTITY, (len(times), 1)), np.zeros((len(times), 3)))
     for curve, until in steps:
         poses = curve.at(times, until).after(poses)
     return poses

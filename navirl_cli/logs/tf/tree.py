@@ -6,7 +6,6 @@ from typing import Final, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.errors import FrameError
@@ -76,8 +75,8 @@ class TransformTree:
         quaternion, translation = np.empty((len(times), 4)), np.empty((len(times), 3))
         for way in ways:
             poses = way.at(times[way.rows])
-            quaternion[way.rows], translation[way.rows] = poses.rotation.as_quat(), poses.translation_m
-        return Transforms(Rotation.from_quat(quaternion), translation)
+            quaternion[way.rows], translation[way.rows] = poses.quaternion, poses.translation_m
+        return Transforms(quaternion, translation)
 
     def span(self, target: str, source: str) -> Span | None:
         """First and last time in ns at which all moving transforms between two frames have begun and not ended.
