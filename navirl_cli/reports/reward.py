@@ -13,8 +13,9 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.tables import Table
 from navirl_cli.evaluation.compare import Comparison
+from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
-from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, center_distance_m
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Rank
 from navirl_cli.irl.status import Status
 from navirl_cli.reports.evaluation import group_table, uniform_line
@@ -29,7 +30,7 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how sure a parameter is, and how lopsided.",
 }
 #: Beside the paper's three, where they are known.
-_METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
+METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 
 
 def report_of(
@@ -73,7 +74,7 @@ def report_of(
         Heading("Where it leads"),
         *_pictures(figures, "policy", "profile"),
         Heading("Paths"),
-        group_table(result, _METRICS),
+        group_table(result, METRICS),
         *_pictures(figures, "properties", "paths"),
         Heading("How typical the demonstrations are"),
         Paragraph(f"R{uniform_line(ranks)[1:]}. Those it was learnt from are counted too."),
