@@ -16,8 +16,10 @@ from pathlib import Path
 import numpy as np
 from rows import Row, median_seconds, report
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.rasterize import rasterize
-from navirl_cli.evaluation.policy_paths import Steps
+from navirl_cli.evaluation.metrics import METRICS
+from navirl_cli.evaluation.policy_paths import PolicyLines, Steps
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import SampledPaths, sample_paths
 from navirl_cli.irl.reward import Reward
@@ -63,15 +65,20 @@ def drawn(where: Path, runs: int) -> list[Row]:
     passed = next(path for path in one.paths if path.part.cycle == 2)
     scene = Scene.on(one.grid, passed.cells[0], passed.cells[-1], one.grid.centres_of(passed.people))
     policy = policy_of(Reward.named(PUBLISHED_THETA), scene)
-    steps, nominal = Steps.of(scene.lattice, scene.people_m, 0.4), scene.nominal_line_m()
+    steps, nominal = Steps(scene.lattice, scene.people_m, 0.4), scene.nominal_line_m()
 
     def draw() -> SampledPaths:
         return sample_paths(policy, scene.start, 10_000, np.random.default_rng(0))
 
     paths = draw()
+
+    def measure() -> list[FloatArray]:
+        lines = PolicyLines.of(steps, paths, nominal)
+        return [metric.lines(lines) for metric in METRICS if metric.lines is not None]
+
     return [
         Row.at_most("drawing 10,000 paths", median_seconds(draw, runs), "s", 3.0),
-        Row.at_most("measuring them", median_seconds(lambda: steps.measured(paths, nominal), runs), "s", 10.0),
+        Row.at_most("measuring them", median_seconds(measure, runs), "s", 10.0),
     ]
 
 

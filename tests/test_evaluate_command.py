@@ -35,7 +35,8 @@ def work(tmp_path_factory):
 def test_all_metrics_are_listed_without_a_file(navirl):
     text = navirl("evaluate", "--list-metrics").stdout
     for metric in METRICS:
-        assert re.search(rf"^{metric.name} +{re.escape(metric.unit)} +{metric.of.value} +", text, re.MULTILINE)
+        needs = ", ".join(metric.needs) or "-"
+        assert re.search(rf"^{metric.name} +{re.escape(metric.unit)} +{metric.paths} +{needs} ", text, re.MULTILINE)
         assert metric.definition in text
 
 

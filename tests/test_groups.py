@@ -9,7 +9,8 @@ from navirl_cli.evaluation.groups import Measured, by_participant, mean_and_spre
 
 
 def row(participant, length, onset=np.nan, kind=DRIVEN):
-    return Measured("", participant, "joystick", {kind: {"length_m": length, "onset_m": onset}})
+    missing = {kind: {} if np.isfinite(onset) else {"onset_m": "never leaves"}}
+    return Measured("", participant, "joystick", {kind: {"length_m": length, "onset_m": onset}}, missing)
 
 
 ROWS = [row("a", 1.0), row("a", 2.0, 0.5), row("b", 4.0), row("c", 7.0, kind=ON_GRID)]
@@ -45,7 +46,8 @@ def test_one_value_has_no_interval():
 def test_a_summary_counts_paths_participants_and_values():
     found = summary_of("joystick", DRIVEN, ROWS)
     assert (found.count, found.participants) == (3, 2)
-    assert found.counts == {"length_m": 3, "onset_m": 1}
+    assert found.missing == {"onset_m": {"never leaves": 2}}
+    assert (found.count_of("length_m"), found.count_of("onset_m")) == (3, 1)
     assert found.mean["length_m"] == pytest.approx(7 / 3)
     assert found.half_interval["length_m"] == pytest.approx(student_half_width([1.5, 4.0]))
     assert np.isnan(found.half_interval["onset_m"])

@@ -1,24 +1,17 @@
 """Length, distance and area: closed forms and slow twins."""
 
+import re
 from itertools import pairwise
 from math import cos, pi, sin, sqrt
 
 import numpy as np
 import oracles
 import pytest
+from path_values import line_values
 
-from navirl_cli.evaluation.metrics import (
-    BY_NAME,
-    LEAVES_M,
-    METRICS,
-    PAPER_METRICS,
-    area_between_m2,
-    center_distance_m,
-    line_values,
-    onset_m,
-    paper_values,
-    path_length_m,
-)
+from navirl_cli.demos.lines import path_length_m
+from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, center_distance_m, onset_m
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric, Need, measure
 
 NOMINAL, PERSON = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[6.0, 0.3]])
 STRAIGHT = np.array([[0.0, 0.0], [4.0, 0.0]])
@@ -34,7 +27,7 @@ def wavy(seed, poses=60):
 
 def test_a_square_detour():
     detour = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 0.0], [4.0, 0.0]])
-    found = paper_values(detour, STRAIGHT, np.array([[1.5, 0.4]]), 0.25)
+    found = line_values(detour, STRAIGHT, np.array([[1.5, 0.4]]), 0.25)
     assert found["length_m"] == pytest.approx(6.0)
     assert found["area_m2"] == pytest.approx(1.0)
     assert found["min_distance_m"] == pytest.approx(0.5 - 0.25)  # to the detour's sides at x = 1 and x = 2
@@ -43,7 +36,7 @@ def test_a_square_detour():
 def test_half_a_circle():
     angles = np.linspace(pi, 0, 2001)
     arc = np.stack([1 + np.cos(angles), np.sin(angles)], axis=1)
-    found = paper_values(arc, np.array([[0.0, 0.0], [2.0, 0.0]]), np.array([[1.0, 0.0]]), 0.0)
+    found = line_values(arc, np.array([[0.0, 0.0], [2.0, 0.0]]), np.array([[1.0, 0.0]]), 0.0)
     assert found["length_m"] == pytest.approx(pi, rel=1e-6)
     assert found["area_m2"] == pytest.approx(pi / 2, rel=1e-6)
     assert found["min_distance_m"] == pytest.approx(1.0, rel=1e-6)
@@ -109,11 +102,11 @@ def test_the_nearest_of_several_people_counts_and_standing_still_does_not_hurt()
 
 
 def test_a_person_within_the_shell_gives_a_negative_distance():
-    assert paper_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.1]]), 0.25)["min_distance_m"] == pytest.approx(-0.15)
+    assert line_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.1]]), 0.25)["min_distance_m"] == pytest.approx(-0.15)
 
 
 def test_without_people_there_is_no_distance():
-    found = paper_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
+    found = line_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
     assert np.isnan(found["min_distance_m"])
     assert found["length_m"] == 4.0
 
@@ -123,7 +116,7 @@ def test_turning_and_moving_the_world_changes_nothing(angle):
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
     line, nominal, people = wavy(3), wavy(4), np.array([[2.0, 0.7]])
     there = [points @ turn.T + [30.0, -7.0] for points in (line, nominal, people)]
-    before, after = paper_values(line, nominal, people, 0.2), paper_values(*there, 0.2)
+    before, after = line_values(line, nominal, people, 0.2), line_values(*there, 0.2)
     assert [after["length_m"], after["min_distance_m"], after["area_m2"]] == pytest.approx(
         [before["length_m"], before["min_distance_m"], before["area_m2"]], rel=1e-9
     )
@@ -132,11 +125,45 @@ def test_turning_and_moving_the_world_changes_nothing(angle):
 def test_names_are_unique_and_the_papers_come_first():
     assert len(BY_NAME) == len(METRICS)
     assert METRICS[:3] == PAPER_METRICS
-    found = line_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.5]]), 0.25)
-    assert set(found) <= set(BY_NAME)
-    assert {name: found[name] for name in ("length_m", "min_distance_m", "area_m2")} == pytest.approx(
-        paper_values(STRAIGHT, STRAIGHT, np.array([[2.0, 0.5]]), 0.25)
-    )
+    assert set(line_values(STRAIGHT, STRAIGHT, PERSON, 0.25)) == {one.name for one in METRICS if one.lines is not None}
+
+
+def test_names_end_with_the_unit():
+    symbols = {"1": "", "m": "_m", "m²": "_m2", "1/m": "_1_m", "m/s": "_m_s", "m/s²": "_m_s2", "m/s³": "_m_s3"}
+    symbols |= {"N": "_n", "N s": "_n_s", "J": "_j", "s": "_s", "rad": "_rad"}
+    for metric in METRICS:
+        assert re.fullmatch("[a-z0-9_]+", metric.name)
+        assert metric.name.endswith(symbols[metric.unit]), metric.name
+
+
+def test_a_metric_is_computed_in_one_way():
+    with pytest.raises(ValueError, match="metric both_m: needs exactly one of lines, drive and near"):
+        Metric("both_m", "both", "m", "", lines=lambda lines: lines.length_m, drive=lambda drive: drive.duration_s)
+    with pytest.raises(ValueError, match="metric neither_m: needs exactly one of"):
+        Metric("neither_m", "neither", "m", "")
+
+
+def test_only_what_is_asked_for_is_computed():
+    def fail(_):
+        raise AssertionError("not asked for")
+
+    costly = Metric("costly_m", "costly", "m", "", lines=fail)
+    for_people = Metric("near_m", "near", "m", "", needs=(Need.PEOPLE,), lines=fail)
+    lines = Lines(STRAIGHT[None], STRAIGHT, NOBODY, 0.25)
+    values, missing = measure([BY_NAME["length_m"], for_people], lines, {Need.PEOPLE})
+    assert values == pytest.approx({"length_m": 4.0, "near_m": np.nan}, nan_ok=True)
+    assert missing == {"near_m": "no people in the scene"}
+    with pytest.raises(AssertionError, match="not asked for"):
+        measure([costly], lines, {Need.PEOPLE})
+
+
+def test_a_value_that_does_not_exist_has_a_reason():
+    lines = Lines(STRAIGHT[None], STRAIGHT, PERSON, 0.25)
+    values, missing = measure([BY_NAME["onset_m"]], lines, set())
+    assert np.isnan(values["onset_m"])
+    assert missing == {"onset_m": "the path does not leave the nominal path by 0.15 m, or does not start on it"}
+    # Neither a driven path's time nor distances to learnt paths are properties of a line.
+    assert measure([BY_NAME["duration_s"], BY_NAME["hausdorff_m"]], lines, set()) == ({}, {})
 
 
 def test_zones_shares_and_mean_distance_of_a_straight_line():

@@ -5,11 +5,16 @@ from dataclasses import replace
 import factories as make
 import numpy as np
 import pytest
+from path_values import drive_values
 
 from navirl_cli.demos.demonstration import Contact
-from navirl_cli.evaluation.motion import contact_values, derivatives, motion_values
+from navirl_cli.evaluation.motion import derivatives
 
 GRID = make.open_grid(60, 30, (-3.0, -1.5))
+
+
+def values(demonstration):
+    return drive_values(demonstration)[0]
 
 
 def moving(xy_m, t_s, **fields):
@@ -29,7 +34,7 @@ def test_derivatives_of_a_cubic_are_exact():
 
 def test_uniform_motion_has_speed_and_nothing_else():
     t = np.sort(np.random.default_rng(0).uniform(0, 10, 400))
-    found = motion_values(moving(np.stack([0.4 * t, -0.3 * t], axis=1), t))
+    found = values(moving(np.stack([0.4 * t, -0.3 * t], axis=1), t))
     assert found["speed_m_s"] == pytest.approx(0.5)
     assert found["acceleration_m_s2"] == pytest.approx(0.0, abs=1e-9)
     assert found["jerk_m_s3"] == pytest.approx(0.0, abs=1e-9)
@@ -39,7 +44,7 @@ def test_uniform_motion_has_speed_and_nothing_else():
 
 def test_a_circle_has_centripetal_acceleration_and_jerk():
     t = np.linspace(0, 20, 601)
-    found = motion_values(moving(2 * np.stack([np.cos(0.5 * t), np.sin(0.5 * t)], axis=1), t))
+    found = values(moving(2 * np.stack([np.cos(0.5 * t), np.sin(0.5 * t)], axis=1), t))
     assert found["speed_m_s"] == pytest.approx(1.0, rel=1e-3)
     assert found["acceleration_m_s2"] == pytest.approx(0.5, rel=0.01)
     assert found["jerk_m_s3"] == pytest.approx(0.25, rel=0.05)
@@ -48,51 +53,61 @@ def test_a_circle_has_centripetal_acceleration_and_jerk():
 def test_noise_of_a_centimetre_does_not_drown_the_speed():
     t = np.linspace(0, 20, 601)
     shaken = np.stack([0.4 * t, np.zeros(601)], axis=1) + np.random.default_rng(1).normal(0, 0.01, (601, 2))
-    assert motion_values(moving(shaken, t))["speed_m_s"] == pytest.approx(0.4, rel=0.02)
+    assert values(moving(shaken, t))["speed_m_s"] == pytest.approx(0.4, rel=0.02)
 
 
 def test_time_in_zones_counts_standing_still():
     # Drives up to 0.5 m beside a person at 0.5 m/s and stands there for 5 s.
     t = np.array([0.0, 4.0, 9.0])
     d = moving(np.array([[-2.0, 0.0], [0.0, 0.0], [0.0, 0.0]]), t, people=[[0.0, 0.5]], robot_radius_m=0.25)
-    found = motion_values(d)
+    found = values(d)
     reach = np.sqrt(0.7**2 - 0.5**2) / 0.5
     assert found["intimate_s"] == pytest.approx(5 + reach, abs=0.03)
     assert sum(found[f"{zone}_s"] for zone in ("intimate", "personal", "social", "public")) == pytest.approx(9.0)
 
 
 def test_short_trials_have_no_derivatives():
-    found = motion_values(moving(np.array([[0.0, 0.0], [0.3, 0.0]]), np.array([0.0, 0.9])))
+    found, missing = drive_values(
+        moving(np.array([[0.0, 0.0], [0.3, 0.0]]), np.array([0.0, 0.9]), force_n=np.zeros((2, 2)))
+    )
     assert np.isnan([found["speed_m_s"], found["jerk_m_s3"]]).all()
+    assert missing["jerk_m_s3"] == missing["work_j"] == "shorter than 1.1 s"
     assert found["duration_s"] == 0.9
+
+
+CONTACT = ("contact_share", "peak_force_n", "impulse_n_s", "work_j")
 
 
 def test_times_that_were_laid_out_measure_nothing():
     t = np.linspace(0, 5, 100)
     d = moving(np.stack([0.4 * t, 0 * t], axis=1), t, laid_out_m_s=0.4)
-    assert np.isnan(list(motion_values(d).values())).all()
     pushed = replace(d, contacts=(Contact(1.0, 2.0, 10.0, (0.0, 10.0)),), force_n=np.zeros((100, 2)))
-    found = contact_values(pushed)
-    assert np.isnan(found["work_j"])
-    assert found["peak_n"] == 10.0
+    found, missing = drive_values(pushed)
+    assert found["peak_force_n"] == 10.0
+    timed = set(found) - {"contact_share", "peak_force_n", "impulse_n_s"}
+    assert np.isnan([found[name] for name in timed]).all()
+    assert missing == dict.fromkeys(timed, "times not measured")
 
 
-def test_work_is_force_times_way():
+def test_work_is_force_along_the_path():
     # 12 N along the motion of 0.5 m/s for 2 s, and 7 N across it, which does no work.
     t = np.linspace(0, 10, 301)
     force = np.tile([12.0, 7.0], (301, 1))
     contacts = (Contact(3.0, 5.0, 13.9, (24.0, 14.0)),)
     d = moving(np.stack([0.5 * t, 0 * t], axis=1), t, force_n=force, contacts=contacts)
-    found = contact_values(d)
+    found = values(d)
     assert found["work_j"] == pytest.approx(12 * 0.5 * 2)
-    assert found["impulse_ns"] == pytest.approx(np.hypot(24, 14))
+    assert found["impulse_n_s"] == pytest.approx(np.hypot(24, 14))
     assert found["contact_share"] == pytest.approx(0.2)
     held_back = replace(d, force_n=-force)
-    assert contact_values(held_back)["work_j"] == pytest.approx(-12.0)
+    assert values(held_back)["work_j"] == pytest.approx(-12.0)
 
 
-def test_nobody_pushed_and_nobody_knows():
+def test_without_a_push_forces_are_zero_and_without_a_wrench_unknown():
     t = np.linspace(0, 5, 100)
     d = moving(np.stack([0.4 * t, 0 * t], axis=1), t, force_n=np.zeros((100, 2)))
-    assert list(contact_values(d).values()) == [0.0, 0.0, 0.0, 0.0]
-    assert np.isnan(list(contact_values(replace(d, contacts=None, force_n=None)).values())).all()
+    found = values(d)
+    assert [found[name] for name in CONTACT] == [0.0, 0.0, 0.0, 0.0]
+    found, missing = drive_values(replace(d, contacts=None, force_n=None))
+    assert np.isnan([found[name] for name in CONTACT]).all()
+    assert [missing[name] for name in CONTACT] == ["no wrench in the log"] * 4

@@ -8,11 +8,12 @@ import study_data
 
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import likelihood
 from navirl_cli.irl.reward import Reward
 from navirl_cli.logs.load import Forces, LoadOptions, load_recording
-from navirl_cli.study.measures import measured
+from navirl_cli.study.measures import rows_of
 
 PRESENT = (study_data.ROOT / "expected.json").is_file()
 pytestmark = pytest.mark.skipif(not PRESENT, reason=study_data.REASON)
@@ -89,13 +90,15 @@ def test_likelihood_and_gradient_of_what_the_logs_hold(extracted, run):
 @pytest.mark.parametrize("run", RUNS)
 def test_path_properties_of_what_the_logs_hold(extracted, run):
     for name, results in EXPECTED["runs"][run].items():
-        rows = measured(of(extracted[run], name))
+        rows = rows_of(of(extracted[run], name))
         metrics = results["metrics"]
         assert len(metrics) in {0, len(rows)}
         for row, expected in zip(rows, metrics, strict=False):
-            assert row.driven["length_m"] == pytest.approx(expected["length_m"], rel=1e-6)
-            assert row.center_distance_m == pytest.approx(expected["min_center_distance_m"], rel=1e-6)
-            assert row.driven["area_m2"] == pytest.approx(expected["area_under_path_m2"], rel=1e-2)
+            assert row.values[DRIVEN]["length_m"] == pytest.approx(expected["length_m"], rel=1e-6)
+            assert row.values[DRIVEN]["min_center_distance_m"] == pytest.approx(
+                expected["min_center_distance_m"], rel=1e-6
+            )
+            assert row.values[DRIVEN]["area_m2"] == pytest.approx(expected["area_under_path_m2"], rel=1e-2)
 
 
 def test_the_summary_holds_the_same_means(summary):

@@ -6,10 +6,10 @@ import factories as make
 import numpy as np
 import pytest
 import study_data
+from path_values import line_values
 from scipy.optimize import minimize
 
 from navirl_cli.demos.rasterize import rasterize
-from navirl_cli.evaluation.metrics import paper_values
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import likelihood, log_likelihood, value_and_gradient
@@ -59,7 +59,7 @@ def test_path_properties(study, run, name):
     metrics = EXPECTED["runs"][run][name]["metrics"]
     for one, result in zip(study[run][name], metrics, strict=False):
         first, last = one.xy_m[0, 0], one.xy_m[-1, 0]
-        found = paper_values(one.xy_m, np.array([[first, 0.05], [last, 0.05]]), one.people_m, 0.0)
+        found = line_values(one.xy_m, np.array([[first, 0.05], [last, 0.05]]), one.people_m, 0.0)
         assert found["length_m"] == pytest.approx(result["length_m"], rel=1e-6)
         assert found["min_distance_m"] == pytest.approx(result["min_center_distance_m"], rel=1e-6)
         assert found["area_m2"] == pytest.approx(result["area_under_path_m2"], rel=1e-2)

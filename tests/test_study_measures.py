@@ -7,7 +7,7 @@ import pytest
 
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
-from navirl_cli.study.measures import groups_of, measured
+from navirl_cli.study.measures import groups_of, rows_of
 
 GRID = make.open_grid(40, 21)
 AT = np.array([[2.05, 1.05]])
@@ -25,7 +25,7 @@ def test_a_path_is_measured_as_driven_and_on_the_grid():
     xy = np.array([[0.12, 1.02], [1.0, 1.05], [2.0, 1.62], [3.88, 1.07]])
     one = make.demonstration(GRID, STRAIGHT, AT)
     one = make.replace(one, xy_m=xy, t_s=np.arange(4.0), yaw_rad=np.zeros(4))
-    (row,) = measured([one])
+    (row,) = rows_of([one])
     assert row.values[DRIVEN]["length_m"] == pytest.approx(oracles.length_by_steps(xy))
     assert row.values[ON_GRID]["length_m"] == pytest.approx(3.7)
     assert row.values[DRIVEN]["min_center_distance_m"] == pytest.approx(
@@ -37,7 +37,7 @@ def test_a_path_is_measured_as_driven_and_on_the_grid():
 
 def test_the_declared_nominal_line_counts():
     raised = np.array([[0.15, 1.25], [3.85, 1.25]])
-    plain, declared = measured([trial(STRAIGHT, 1), trial(STRAIGHT, 2, nominal_m=raised)])
+    plain, declared = rows_of([trial(STRAIGHT, 1), trial(STRAIGHT, 2, nominal_m=raised)])
     assert plain.values[DRIVEN]["area_m2"] == pytest.approx(0.0)
     assert declared.values[DRIVEN]["area_m2"] == pytest.approx(3.7 * 0.2)
 
@@ -51,7 +51,7 @@ def test_groups_leave_trials_without_people_out():
         trial(AROUND, 4, condition=Condition.AUTONOMOUS, cycle=None, set="obstacle avoidance"),
         trial(AROUND, 5, condition=Condition.JOYSTICK, cycle=None, participant="p2"),
     ]
-    rows = measured(trials)
+    rows = rows_of(trials)
     assert [row.group for row in rows][2] == "force, obstacle course"
     groups = groups_of(trials, rows)
     assert [(one.group, one.kind) for one in groups] == [

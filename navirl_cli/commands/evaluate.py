@@ -23,7 +23,7 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.documents.tables import ENDINGS, Format, formatted
+from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import ArtefactError, DemonstrationError
 from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import MOST, Precision
@@ -33,7 +33,7 @@ from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import check_writable, replacing
 from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.evaluation import METRICS_HEADER, document, metric_rows, tables
+from navirl_cli.reports.evaluation import document, metrics_table, tables
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]
@@ -56,7 +56,7 @@ class Names(click.ParamType):  # type: ignore[type-arg]
 def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
     """Print all metrics and end."""
     if value:
-        click.echo(formatted(METRICS_HEADER, metric_rows(), Format.TEXT))
+        click.echo(written(metrics_table()))
         ctx.exit()
 
 
@@ -159,6 +159,7 @@ def evaluate(
             learnt,
             Precision(samples, precision),
             rng,
+            metrics=metrics,
             fields=fields,
             progress=lambda done, _all: update(done, ""),
         )

@@ -1,6 +1,6 @@
-"""Demonstrated paths against learnt ones and against paths that know nothing of people's wishes."""
+"""Demonstrated paths beside learnt ones and beside paths that do not depend on people's wishes."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.drawn import Drawn, Precision, draw
+from navirl_cli.evaluation.drawn import Drawn, Precision, Shown, draw, expected_of
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
-from navirl_cli.evaluation.metrics import METRICS, line_values
-from navirl_cli.evaluation.motion import contact_values, motion_values
-from navirl_cli.evaluation.policy_paths import nearness
+from navirl_cli.evaluation.lines import Lines
+from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, measure, missing_of
+from navirl_cli.evaluation.motion import Drive
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
 
@@ -20,13 +20,14 @@ from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
 PERSON_RADIUS_M = 0.25
 
 DRIVEN, ON_GRID, LEARNT, NOMINAL, AVOIDANCE = "driven", "driven, on grid", "learnt", "nominal", "avoidance"
-#: What each kind of path is, in the order of the tables; several rewards have "learnt, NAME" each.
+#: The types of paths, in the order of the tables; several rewards have "learnt, NAME" each.
 KINDS: dict[str, str] = {
     DRIVEN: "the demonstrated poses",
     ON_GRID: "the demonstrated path through the centres of its cells, comparable with learnt paths",
     LEARNT: "paths drawn from the learnt policy, through the centres of cells",
-    NOMINAL: "the line that the log says the navigation followed, else the shortest way on the map without people",
-    AVOIDANCE: "the shortest way on the grid around people as obstacles of radius 0.25 m",
+    NOMINAL: "the line that the navigation followed, from the log; without it the shortest path on the map without "
+    "people",
+    AVOIDANCE: f"the shortest path on the grid around people as obstacles of radius {PERSON_RADIUS_M:g} m",
 }
 
 
@@ -46,6 +47,7 @@ def compare(
     precision: Precision,
     rng: np.random.Generator,
     *,
+    metrics: Sequence[Metric] = PAPER_METRICS,
     fields: Collection[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Comparison:
@@ -56,6 +58,7 @@ def compare(
         rewards: Learnt rewards by name; none to measure no learnt paths.
         precision: How many paths to draw from a policy in each scene.
         rng: Source of randomness.
+        metrics: To compute; others cost nothing.
         fields: Names of FIELDS to group by; none for condition, cycle and set.
         progress: Called with demonstrations done and in all.
 
@@ -63,92 +66,124 @@ def compare(
         The metrics.
 
     Raises:
-        SceneError: A demonstration's scene has no way.
+        SceneError: A demonstration's scene has no path from start to goal.
         InfinitePartitionError: A reward has no policy in a scene.
     """
-    learnt: dict[tuple[str, str], list[tuple[Drawn, dict[str, FloatArray]]]] = {}
-    known: dict[tuple[str, int, float], Drawn] = {}
-    rows: list[Measured] = []
     notes: list[str] = []
-    for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
-        group = group_of(one, fields)
-        paths = _lines(one, scene, notes)
-        nominal = paths[NOMINAL]
-        found = {
-            kind: dict(line_values(line, nominal, one.people_m, one.robot_radius_m)) for kind, line in paths.items()
-        }
-        found[DRIVEN] |= {**motion_values(one), **contact_values(one)}
-        rows.append(Measured(one.id, one.participant, group, found))
+    lines = list(_lines_of(demonstrations, scenes := scenes_of(demonstrations), notes))
+    where = _shown(demonstrations, scenes, lines)
+    rows: list[Measured] = []
+    drawn: dict[tuple[str, Shown], Drawn] = {}
+    for number, (one, shown) in enumerate(zip(demonstrations, where, strict=True)):
+        rows.append(measured(one, lines[number], shown.nominal_m, metrics, group_of(one, fields)))
         for name, reward in rewards.items():
-            key = (name, id(scene), one.robot_radius_m)
-            if key not in known:
-                known[key] = draw(reward, scene, nominal, one.robot_radius_m, precision, rng)
-            near = nearness(paths[ON_GRID], known[key].paths, scene.lattice)
-            kind = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
-            learnt.setdefault((group, kind), []).append((known[key], near))
+            if (name, shown) not in drawn:
+                drawn[name, shown] = draw(reward, shown, metrics, precision, rng)
         if progress is not None:
             progress(number + 1, len(demonstrations))
-    groups = [
-        summary_of(group, kind, [row for row in rows if row.group == group])
-        for group in dict.fromkeys(row.group for row in rows)
-        for kind in dict.fromkeys(kind for row in rows if row.group == group for kind in row.values)
-    ]
-    groups += [_learnt(group, kind, members) for (group, kind), members in learnt.items()]
-    order = list(by_group(demonstrations, fields))
-    groups.sort(key=lambda row: (order.index(row.group), _place(row.kind), row.kind))
+    groups: list[GroupMetrics] = []
+    for group in by_group(demonstrations, fields):
+        own = [number for number, row in enumerate(rows) if row.group == group]
+        kinds = dict.fromkeys(kind for number in own for kind in rows[number].values)
+        found = {kind: summary_of(group, kind, [rows[number] for number in own]) for kind in kinds}
+        for name in rewards:
+            members = [(drawn[name, where[number]], where[number].numbers.index(number)) for number in own]
+            kind = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
+            found[kind] = expected_of(group, kind, members, metrics)
+        groups += [found[kind] for kind in sorted(found, key=lambda kind: (_place(kind), kind)) if found[kind].mean]
     return Comparison(tuple(groups), tuple(rows), tuple(notes))
 
 
 def _place(kind: str) -> int:
-    """A kind's place in the tables."""
+    """A type's place in the tables."""
     return list(KINDS).index(kind if kind in KINDS else LEARNT)
 
 
+def _shown(
+    demonstrations: Sequence[Demonstration], scenes: Sequence[Scene], lines: Sequence[Mapping[str, FloatArray]]
+) -> list[Shown]:
+    """For each demonstration the demonstrations that share its learnt paths.
+
+    Learnt paths run through centres of cells. Nominal paths between the same cells are the same for them, and the first
+    one stands for all: declared ones start where the robot stood within the cell.
+    """
+    keys = [
+        (scene, one.robot_radius_m, one.grid.cells_of(own[NOMINAL]).tobytes())
+        for one, scene, own in zip(demonstrations, scenes, lines, strict=True)
+    ]
+    members: dict[tuple[Scene, float, bytes], list[int]] = {}
+    for number, key in enumerate(keys):
+        members.setdefault(key, []).append(number)
+    known = {
+        key: Shown(key[0], lines[own[0]][NOMINAL], key[1], tuple(own), tuple(lines[n][ON_GRID] for n in own))
+        for key, own in members.items()
+    }
+    return [known[key] for key in keys]
+
+
 def nominal_of(demonstration: Demonstration, scene: Scene) -> FloatArray:
-    """(k, 2) m: the line that the navigation followed, where the log says, else the scene's nominal path."""
+    """(k, 2) m: the line that the navigation followed, where the log holds it, else the scene's nominal path."""
     return scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m
 
 
-def _lines(demonstration: Demonstration, scene: Scene, notes: list[str]) -> dict[str, FloatArray]:
-    """The line of every kind but the learnt."""
-    lines = {
-        DRIVEN: demonstration.xy_m,
-        ON_GRID: demonstration.grid.centres_of(demonstration.cells),
-        NOMINAL: nominal_of(demonstration, scene),
+def measured(
+    demonstration: Demonstration,
+    lines: Mapping[str, FloatArray],
+    nominal_m: FloatArray,
+    metrics: Sequence[Metric],
+    group: str,
+) -> Measured:
+    """Measure the paths of one demonstration.
+
+    Args:
+        demonstration: The demonstration.
+        lines: (n, 2) m each, by type of path.
+        nominal_m: (k, 2) m.
+        metrics: To compute.
+        group: Its group.
+    """
+    lacking, one = missing_of(demonstration), demonstration
+    found = {
+        kind: measure(
+            metrics,
+            Lines(line[None], nominal_m, one.people_m, one.robot_radius_m),
+            lacking,
+            Drive(one) if kind == DRIVEN else None,
+        )
+        for kind, line in lines.items()
     }
+    values = {kind: values for kind, (values, _) in found.items()}
+    return Measured(one.id, one.participant, group, values, {kind: reasons for kind, (_, reasons) in found.items()})
+
+
+def _lines_of(
+    demonstrations: Sequence[Demonstration], scenes: Sequence[Scene], notes: list[str]
+) -> Iterator[dict[str, FloatArray]]:
+    """The lines of every demonstration by type, learnt ones aside; those of a scene are found once."""
+    nominal: dict[Scene, FloatArray] = {}
+    avoidance: dict[tuple[Scene, float], FloatArray | SceneError] = {}
+    for one, scene in zip(demonstrations, scenes, strict=True):
+        if one.nominal_m is None and scene not in nominal:
+            nominal[scene] = nominal_of(one, scene)
+        clearance = one.robot_radius_m + PERSON_RADIUS_M
+        if (scene, clearance) not in avoidance:
+            avoidance[scene, clearance] = _avoidance(scene, clearance)
+        lines = {
+            DRIVEN: one.xy_m,
+            ON_GRID: one.grid.centres_of(one.cells),
+            NOMINAL: nominal[scene] if one.nominal_m is None else one.nominal_m,
+        }
+        around = avoidance[scene, clearance]
+        if isinstance(around, SceneError):
+            notes.append(f"{one.id}: no path around the people as obstacles: {around}")
+        else:
+            lines[AVOIDANCE] = around
+        yield lines
+
+
+def _avoidance(scene: Scene, clearance_m: float) -> FloatArray | SceneError:
+    """The path around people, or why there is none."""
     try:
-        clearance = demonstration.robot_radius_m + PERSON_RADIUS_M
-        lines[AVOIDANCE] = avoidance_line_m(scene, clearance)
+        return avoidance_line_m(scene, clearance_m)
     except SceneError as error:
-        notes.append(f"{demonstration.id}: no path around the people as obstacles: {error}")
-    return lines
-
-
-def _learnt(group: str, kind: str, members: Sequence[tuple[Drawn, dict[str, FloatArray]]]) -> GroupMetrics:
-    """Expected values over the scenes of a group, each as often as it was demonstrated in."""
-    scenes: dict[int, list[tuple[Drawn, dict[str, FloatArray]]]] = {}
-    for member in members:
-        scenes.setdefault(id(member[0]), []).append(member)
-    mean, spread, error, exact = {}, {}, {}, {}
-    share = np.array([len(own) / len(members) for own in scenes.values()])
-    for metric in METRICS:
-        name = metric.name
-        if name not in (members[0][0].values | members[0][1]):
-            continue
-        # Demonstrations of one scene share its paths, so that they share the error too.
-        every = [[(drawn.values | near)[name] for drawn, near in own] for own in scenes.values()]
-        known = np.isfinite([np.mean(own) for own in every])  # distances need people
-        if not known.any():
-            mean[name] = spread[name] = error[name] = float("nan")
-            continue
-        every = [own for own, one in zip(every, known, strict=True) if one]
-        weight = share[known] / share[known].sum()
-        mean[name] = float(weight @ [np.mean(own) for own in every])
-        second = float(weight @ [np.mean(np.square(own)) for own in every])
-        spread[name] = float(np.sqrt(max(second - mean[name] ** 2, 0.0)))
-        errors = np.array([np.mean(own, axis=0).std(ddof=1) / np.sqrt(len(own[0])) for own in every])
-        error[name] = float(np.sqrt(weight**2 @ errors**2))
-        values = [drawn.exact[name] for drawn, _ in members if np.isfinite(drawn.exact.get(name, np.nan))]
-        if values:
-            exact[name] = float(np.mean(values))
-    return GroupMetrics(group, kind, len(members), mean, spread, error, exact)
+        return error

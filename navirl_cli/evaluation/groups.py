@@ -38,9 +38,14 @@ class GroupMetrics(ByContent):
     #: Of other paths: half the 95 % interval of the mean, participants counting with their own means (Student); NaN
     #: for one participant.
     half_interval: Values = field(default_factory=dict)
-    #: Of other paths: number of participants, and of paths with a value by metric.
+    #: Of other paths: number of participants.
     participants: int = 0
-    counts: Mapping[str, int] = field(default_factory=dict)
+    #: By metric and reason: number of demonstrations whose value does not exist.
+    missing: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+
+    def count_of(self, name: str) -> int:
+        """Number of demonstrations with a value of a metric."""
+        return self.count - sum(self.missing.get(name, {}).values())
 
     def expected(self, name: str) -> float:
         """Mean of a metric, the exact one where there is one; NaN where there is none."""
@@ -60,6 +65,8 @@ class Measured(ByContent):
     group: str
     #: By type of path, then by metric.
     values: Mapping[str, Values]
+    #: By type of path and metric: why the value does not exist.
+    missing: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
@@ -93,14 +100,16 @@ def summary_of(group: str, kind: str, rows: Iterable[Measured]) -> GroupMetrics:
         rows: What was measured of the group; demonstrations without this type of path do not count.
     """
     paths = [row for row in rows if kind in row.values]
-    mean, std, half, counts = {}, {}, {}, {}
+    mean, std, half = {}, {}, {}
+    missing: dict[str, dict[str, int]] = {}
     for name in dict.fromkeys(name for row in paths for name in row.values[kind]):
-        values = [value for row in paths if np.isfinite(value := row.values[kind].get(name, np.nan))]
-        mean[name], std[name] = mean_and_spread(values)
+        mean[name], std[name] = mean_and_spread(row.values[kind][name] for row in paths)
         half[name] = student_half_width(by_participant(paths, kind, name).values())
-        counts[name] = len(values)
+        for reason in (row.missing[kind][name] for row in paths if name in row.missing.get(kind, {})):
+            own = missing.setdefault(name, {})
+            own[reason] = own.get(reason, 0) + 1
     people = len({row.participant for row in paths})
-    return GroupMetrics(group, kind, len(paths), mean, std, half_interval=half, participants=people, counts=counts)
+    return GroupMetrics(group, kind, len(paths), mean, std, half_interval=half, participants=people, missing=missing)
 
 
 def by_participant(rows: Iterable[Measured], kind: str, name: str) -> dict[str, float]:

@@ -1,253 +1,366 @@
-"""What can be measured of a path: names, units, definitions, and the values that follow from its line."""
+"""The metrics: each is declared here, with what it needs and the function that computes it, and nowhere else.
 
-from collections.abc import Mapping
+To add one, write the function, append a :class:`Metric` to METRICS and write a test; ``python -m
+navirl_cli.reports.evaluation > METRICS.md`` renews the page. Tables, files, options and completions read METRICS.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.demos.lines import divided, path_length_m, thinned
-from navirl_cli.evaluation.segments import ZONES, segments
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.evaluation.lines import LEAVES_M, Lines, zone_text
+from navirl_cli.evaluation.motion import Drive
+from navirl_cli.evaluation.policy_paths import Nearness, Visits
+from navirl_cli.evaluation.segments import ZONES
 
 #: Values of one path by metric; NaN where one does not exist.
 Values = Mapping[str, float]
-#: Driven lines are looked at in pieces no longer than this, m, and turns between points this far apart (a little less,
-#: so that points of the grid stay).
-PIECE_M, APART_M = 0.1, 0.0999
-#: A path has left the nominal one where it is farther from it than this, m: a cell and a half.
-LEAVES_M = 0.15
 
 
-class Of(StrEnum):
-    """What a metric needs."""
+class Need(StrEnum):
+    """What a metric needs of a demonstration, beside its path."""
 
-    LINE = "a path"
-    PEOPLE = "a path and people"
+    PEOPLE = "people"
     TIMES = "measured times"
-    CONTACT = "a wrench"
-    LEARNT = "a learnt policy"
+    WRENCH = "a wrench"
+
+    @property
+    def missing(self) -> str:
+        """The reason for a value that does not exist for want of this."""
+        return _MISSING[self]
 
 
-@dataclass(frozen=True)
+_MISSING = {
+    Need.PEOPLE: "no people in the scene",
+    Need.TIMES: "times not measured",
+    Need.WRENCH: "no wrench in the log",
+}
+#: The reason for metrics of learnt paths where no reward is given.
+NO_REWARD = "no learnt reward given"
+
+
+def missing_of(demonstration: Demonstration) -> frozenset[Need]:
+    """What a demonstration lacks."""
+    found = {
+        Need.PEOPLE: len(demonstration.people_m) > 0,
+        Need.TIMES: demonstration.laid_out_m_s is None,
+        Need.WRENCH: demonstration.contacts is not None and demonstration.force_n is not None,
+    }
+    return frozenset(need for need, there in found.items() if not there)
+
+
+@dataclass(frozen=True, eq=False)
 class Metric:
-    """What a number in a table is."""
+    """A number that describes a path, and how it is computed: by exactly one of ``lines``, ``drive`` and ``near``.
 
+    Raises:
+        ValueError: There are two functions, or none.
+    """
+
+    #: As in options, files and CSV: lower case, with the unit.
     name: str
+    #: For tables, without the unit; "1" for none.
     label: str
     unit: str
     definition: str
-    of: Of = Of.LINE
     source: str = ""
+    needs: tuple[Need, ...] = ()
+    #: (m,) values of the paths of any type: driven, on the grid, learnt, nominal, avoidance.
+    lines: Callable[[Lines], FloatArray] | None = None
+    #: Value of a demonstration as it was driven, for what a line does not tell.
+    drive: Callable[[Drive], float] | None = None
+    #: (m,) values of learnt paths beside a demonstrated one.
+    near: Callable[[Nearness], FloatArray] | None = None
+    #: Exact expected value under a policy, where visits give it; without it the mean of drawn paths counts.
+    exact: Callable[[Visits], float] | None = None
+    #: When a value does not exist although everything that the metric needs is there.
+    undefined: str = "not defined for this path"
+
+    def __post_init__(self) -> None:
+        """Check that it is computed in one way."""
+        if sum(function is not None for function in (self.lines, self.drive, self.near)) != 1:
+            raise ValueError(f"metric {self.name}: needs exactly one of lines, drive and near")
 
     @property
     def heading(self) -> str:
         """Label and unit, where it has one."""
         return self.label if self.unit == "1" else f"{self.label} {self.unit}"
 
+    @property
+    def paths(self) -> str:
+        """The types of paths that have it, in a word."""
+        return "all" if self.lines is not None else "driven" if self.drive is not None else "learnt"
 
-_HALL = "zones: Hall, The Hidden Dimension, 1966"
+    def reason(self, missing: Collection[Need]) -> str | None:
+        """Why it does not exist where these are missing; None where all that it needs is there."""
+        return next((need.missing for need in self.needs if need in missing), None)
+
+
 _PAPER = "Kollmitz et al., IROS 2020, Fig. 7"
+_HALL = "zones: Hall, The Hidden Dimension, 1966"
+_HUNAV = "Perez-Higueras et al., HuNavSim, 2023"
+#: When smoothed derivatives do not exist.
+_SHORT = "shorter than 1.1 s"
+
 
 #: The paper's three, in the order of its figure.
 PAPER_METRICS: tuple[Metric, ...] = (
-    Metric("length_m", "path length", "m", "sum of the lengths of the path's segments", source=_PAPER),
+    Metric(
+        "length_m",
+        "path length",
+        "m",
+        "sum of the lengths of the path's segments",
+        _PAPER,
+        lines=lambda lines: lines.length_m,
+        exact=lambda visits: visits.length_m,
+    ),
     Metric(
         "min_distance_m",
         "min. distance",
         "m",
-        "least distance between the robot's shell and a person's centre, over all segments and people",
-        Of.PEOPLE,
+        "smallest distance between the robot's shell and a person's centre, over all segments and people",
         _PAPER,
+        (Need.PEOPLE,),
+        lines=lambda lines: lines.min_distance_m,
     ),
-    Metric("area_m2", "area under path", "m²", "unsigned area between the path and the nominal path", source=_PAPER),
+    Metric(
+        "area_m2",
+        "area under path",
+        "m²",
+        "area between the path and the nominal path; areas on both sides add up",
+        _PAPER,
+        lines=lambda lines: lines.area_m2,
+    ),
 )
 
 
-def _zone_text(number: int) -> str:
-    """The borders of a zone."""
-    low = ZONES[number - 1][1] if number else 0.0
-    high = ZONES[number][1]
-    return f"from {low:g} m on" if np.isinf(high) else f"{low:g} to {high:g} m" if number else f"below {high:g} m"
-
-
 def _zone_metrics() -> list[Metric]:
-    """Way, share of the way and time in each zone."""
+    """Path length, share of the path length, and time in each zone."""
     found = []
-    for number, (name, _) in enumerate(ZONES):
-        where = f"where the robot's shell is {_zone_text(number)} from the nearest person's centre"
+    for number, (zone, _) in enumerate(ZONES):
+        where = f"the robot's shell is {zone_text(number)} from the nearest person's centre"
+
+        def length(path: Lines, number: int = number) -> FloatArray:
+            return path.zones_m[:, number]
+
+        def share(path: Lines, number: int = number) -> FloatArray:
+            return path.zones_m[:, number] / path.length_m
+
+        def time(drive: Drive, number: int = number) -> float:
+            return float(drive.zones_s[number])
+
+        def expected(visits: Visits, number: int = number) -> float:
+            return float(visits.zones_m[number])
+
+        people, times = (Need.PEOPLE,), (Need.TIMES, Need.PEOPLE)
+        length_label, share_label, time_label = (f"{what} in {zone} zone" for what in ("path length", "share", "time"))
         found += [
-            Metric(f"{name}_m", f"way, {name}", "m", f"way {where}", Of.PEOPLE, _HALL),
-            Metric(f"{name}_share", f"share, {name}", "1", f"share of the way {where}", Of.PEOPLE, _HALL),
-            Metric(f"{name}_s", f"time, {name}", "s", f"time {where}", Of.TIMES, _HALL),
+            Metric(
+                f"{zone}_m",
+                length_label,
+                "m",
+                f"length of the path where {where}",
+                _HALL,
+                people,
+                lines=length,
+                exact=expected,
+            ),
+            Metric(
+                f"{zone}_share", share_label, "1", f"share of the path length where {where}", _HALL, people, lines=share
+            ),
+            Metric(f"{zone}_s", time_label, "s", f"time during which {where}", _HALL, times, drive=time),
         ]
     return found
 
 
-#: Everything that is measured, in the order of the tables.
+#: All metrics, in the order of the tables.
 METRICS: tuple[Metric, ...] = (
     *PAPER_METRICS,
+    Metric(
+        "min_center_distance_m",
+        "min. distance of centres",
+        "m",
+        "smallest distance between the robot's centre and a person's centre",
+        needs=(Need.PEOPLE,),
+        lines=lambda lines: lines.min_distance_m + lines.robot_radius_m,
+    ),
     Metric(
         "mean_distance_m",
         "mean distance",
         "m",
-        "mean over the way of the distance between the robot's shell and the nearest person's centre",
-        Of.PEOPLE,
-        "Perez-Higueras et al., HuNavSim, 2023",
+        "mean along the path of the distance between the robot's shell and the nearest person's centre",
+        _HUNAV,
+        (Need.PEOPLE,),
+        lines=lambda lines: lines.mean_distance_m,
     ),
     Metric(
         "compliance",
         "space compliance",
         "1",
-        "share of the way outside of the intimate zone",
-        Of.PEOPLE,
+        "share of the path length outside the intimate zone",
         "Kapoor et al., SocNavGym, 2023 (there over steps)",
+        (Need.PEOPLE,),
+        lines=lambda lines: 1 - lines.zones_m[:, 0] / lines.length_m,
     ),
     *_zone_metrics(),
+    Metric(
+        "onset_m",
+        "avoidance onset",
+        "m",
+        "distance to the first person, along the nominal path, from where the path has left the nominal path by "
+        f"{LEAVES_M:g} m; negative behind the person",
+        needs=(Need.PEOPLE,),
+        lines=lambda lines: lines.onset_m,
+        undefined=f"the path does not leave the nominal path by {LEAVES_M:g} m, or does not start on it",
+    ),
     Metric(
         "heading_rad",
         "heading change",
         "rad",
-        "sum of absolute changes of direction between points 10 cm apart, or between moves on the grid",
-        source="Perez-Higueras et al., HuNavSim, 2023",
+        "sum of the absolute changes of direction, between points 10 cm apart or between moves on the grid",
+        _HUNAV,
+        lines=lambda lines: lines.heading_rad,
+        exact=lambda visits: visits.heading_rad,
     ),
-    Metric("curvature_1_m", "mean curvature", "1/m", "heading change over path length"),
-    Metric("duration_s", "duration", "s", "time from the first pose to the last", Of.TIMES),
-    Metric("speed_m_s", "mean speed", "m/s", "mean size of the smoothed velocity", Of.TIMES),
-    Metric("acceleration_m_s2", "mean acceleration", "m/s²", "mean size of its first derivative", Of.TIMES),
-    Metric("jerk_m_s3", "mean jerk", "m/s³", "mean size of its second derivative, the position's third", Of.TIMES),
-    Metric("contact_share", "contact", "1", "share of the time in contact", Of.CONTACT),
-    Metric("peak_n", "peak force", "N", "largest horizontal force in contact", Of.CONTACT),
-    Metric("impulse_ns", "impulse", "N s", "sum over contacts of the size of the force's integral", Of.CONTACT),
-    Metric("work_j", "work", "J", "integral over contacts of force times velocity: done by the person", Of.CONTACT),
+    Metric(
+        "curvature_1_m",
+        "mean curvature",
+        "1/m",
+        "heading change divided by path length",
+        lines=lambda lines: lines.heading_rad / lines.length_m,
+    ),
+    Metric(
+        "duration_s",
+        "duration",
+        "s",
+        "time from the first pose to the last",
+        needs=(Need.TIMES,),
+        drive=lambda drive: drive.duration_s,
+    ),
+    Metric(
+        "speed_m_s",
+        "mean speed",
+        "m/s",
+        "mean magnitude of the velocity, smoothed over 1.1 s",
+        needs=(Need.TIMES,),
+        drive=lambda drive: drive.speed_m_s,
+        undefined=_SHORT,
+    ),
+    Metric(
+        "acceleration_m_s2",
+        "mean acceleration",
+        "m/s²",
+        "mean magnitude of the first derivative of the velocity",
+        needs=(Need.TIMES,),
+        drive=lambda drive: drive.acceleration_m_s2,
+        undefined=_SHORT,
+    ),
+    Metric(
+        "jerk_m_s3",
+        "mean jerk",
+        "m/s³",
+        "mean magnitude of the second derivative of the velocity",
+        needs=(Need.TIMES,),
+        drive=lambda drive: drive.jerk_m_s3,
+        undefined=_SHORT,
+    ),
+    Metric(
+        "contact_share",
+        "contact",
+        "1",
+        "share of the time in contact",
+        needs=(Need.WRENCH,),
+        drive=lambda drive: drive.contact_share,
+    ),
+    Metric(
+        "peak_force_n",
+        "peak force",
+        "N",
+        "largest horizontal force in contact, 0 without contact",
+        needs=(Need.WRENCH,),
+        drive=lambda drive: drive.peak_force_n,
+    ),
+    Metric(
+        "impulse_n_s",
+        "impulse",
+        "N s",
+        "sum over the contacts of the magnitude of the force's integral",
+        needs=(Need.WRENCH,),
+        drive=lambda drive: drive.impulse_n_s,
+    ),
+    Metric(
+        "work_j",
+        "work",
+        "J",
+        "integral over the contacts of force times velocity: work done by the person",
+        needs=(Need.WRENCH, Need.TIMES),
+        drive=lambda drive: drive.work_j,
+        undefined=_SHORT,
+    ),
     Metric(
         "to_learnt_m",
-        "demo to learnt",
+        "demonstrated to learnt",
         "m",
-        "mean over the demonstrated path of the nearest distance to a learnt one, both through centres of cells",
-        Of.LEARNT,
+        "mean over the demonstrated path's cells of the distance to the learnt path",
         "path dissimilarity, as in upo_nav_irl (Perez-Higueras et al.)",
+        near=lambda near: near.to_learnt_m,
     ),
-    Metric("from_learnt_m", "learnt to demo", "m", "the same from the learnt path to the demonstrated", Of.LEARNT),
-    Metric("dissimilarity_m", "dissimilarity", "m", "mean of the two", Of.LEARNT),
+    Metric(
+        "from_learnt_m",
+        "learnt to demonstrated",
+        "m",
+        "mean over the learnt path's cells of the distance to the demonstrated path",
+        near=lambda near: near.from_learnt_m,
+    ),
+    Metric(
+        "dissimilarity_m",
+        "dissimilarity",
+        "m",
+        "mean of the two: demonstrated to learnt, and learnt to demonstrated",
+        near=lambda near: (near.to_learnt_m + near.from_learnt_m) / 2,
+    ),
     Metric(
         "hausdorff_m",
         "mod. Hausdorff",
         "m",
-        "the larger of the two",
-        Of.LEARNT,
+        "the larger of the two: demonstrated to learnt, and learnt to demonstrated",
         "Dubuisson and Jain, ICPR 1994 (modified Hausdorff distance)",
+        near=lambda near: np.maximum(near.to_learnt_m, near.from_learnt_m),
     ),
 )
 BY_NAME: Mapping[str, Metric] = {metric.name: metric for metric in METRICS}
 
 
-def paper_values(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray, robot_radius_m: float) -> Values:
-    """The paper's three properties of a path.
+def measure(
+    metrics: Sequence[Metric], lines: Lines, missing: Collection[Need], drive: Drive | None = None
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Values of one path.
 
     Args:
-        line_m: (n, 2) m, the path.
-        nominal_m: (k, 2) m, the nominal path as a line.
-        people_m: (p, 2) m.
-        robot_radius_m: Taken off the distance between centres, m.
-    """
-    return {
-        "length_m": path_length_m(line_m),
-        "min_distance_m": center_distance_m(line_m, people_m) - robot_radius_m,
-        "area_m2": area_between_m2(line_m, nominal_m),
-    }
-
-
-def line_values(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray, robot_radius_m: float) -> Values:
-    """Everything that follows from a path's line and the people; arguments as of :func:`paper_values`."""
-    found = dict(paper_values(line_m, nominal_m, people_m, robot_radius_m))
-    length = found["length_m"]
-    pieces, _ = divided(line_m, np.arange(float(len(line_m))), PIECE_M)
-    parts = segments(pieces[:-1], pieces[1:], people_m, robot_radius_m)
-    ways = parts.zones_m.sum(axis=0) if len(people_m) else np.full(len(ZONES), np.nan)
-    found |= shares(length, float(parts.distance_m2.sum()) / length, ways)
-    return found | turning(heading_change_rad(thinned(line_m, APART_M)), length)
-
-
-def shares(length_m: float, mean_distance_m: float, zones_m: FloatArray) -> dict[str, float]:
-    """Values that follow from the way in each zone."""
-    found = {"mean_distance_m": mean_distance_m, "compliance": 1 - float(zones_m[0]) / length_m}
-    for (name, _), way in zip(ZONES, zones_m.tolist(), strict=True):
-        found |= {f"{name}_m": way, f"{name}_share": way / length_m}
-    return found
-
-
-def turning(heading_rad: float, length_m: float) -> dict[str, float]:
-    """Values that follow from the heading change."""
-    return {"heading_rad": heading_rad, "curvature_1_m": heading_rad / length_m}
-
-
-def heading_change_rad(line_m: FloatArray) -> float:
-    """Sum of the absolute changes of direction between the segments of an (n, 2) line, rad; rests do not count."""
-    steps = np.diff(line_m, axis=0)
-    steps = steps[(steps != 0).any(axis=1)]
-    turned = np.angle(np.exp(1j * np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
-    return float(np.abs(turned).sum())
-
-
-def center_distance_m(line_m: FloatArray, people_m: FloatArray) -> float:
-    """Least distance between an (n, 2) line (segments, not only corners) and (p, 2) points, m; NaN for p = 0."""
-    if len(people_m) == 0:
-        return float("nan")
-    return float(segments(line_m[:-1], line_m[1:], people_m, 0.0).least_m.min())
-
-
-def area_between_m2(line_m: FloatArray, nominal_m: FloatArray) -> float:
-    """Area between two lines with about the same ends, unsigned: where they cross, areas do not cancel.
-
-    The two lines and the joins of their ends cut the plane into faces; the area is that of all bounded ones.
-
-    Args:
-        line_m: (n, 2) m.
-        nominal_m: (k, 2) m.
+        metrics: To compute; those that this type of path does not have are left out.
+        lines: The path, one line.
+        missing: What its demonstration lacks.
+        drive: The demonstration, of the path as it was driven.
 
     Returns:
-        Area in m^2. Source: Kollmitz et al., Fig. 7; the faces as in shapely's polygonize.
+        By metric: value, NaN where it does not exist, and for those the reason.
     """
-    return float(areas_m2(line_m[None], nominal_m)[0])
-
-
-def areas_m2(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
-    """Areas between many lines and a nominal one, each as :func:`area_between_m2`.
-
-    Args:
-        lines_m: (m, n, 2) m; a line may rest at its end.
-        nominal_m: (k, 2) m.
-    """
-    import shapely
-
-    back = np.broadcast_to(nominal_m[::-1], (len(lines_m), *nominal_m.shape))
-    rings = np.concatenate([lines_m, back, lines_m[:, :1]], axis=1)
-    faces = shapely.polygonize(shapely.node(shapely.linestrings(rings))[:, None])
-    area: FloatArray = shapely.area(faces)
-    return area
-
-
-def onset_m(line_m: FloatArray, nominal_m: FloatArray, people_m: FloatArray) -> float:
-    """How far before the first person a path leaves the nominal one, along it.
-
-    Args:
-        line_m: (n, 2) m, the path.
-        nominal_m: (k, 2) m.
-        people_m: (p, 2) m.
-
-    Returns:
-        m; negative where it leaves behind the first person; NaN where there is nobody, or the path never leaves the
-        nominal one by LEAVES_M, or starts away from it.
-    """
-    from shapely import LineString, distance, line_locate_point, points
-
-    nominal = LineString(nominal_m)
-    away = distance(points(line_m), nominal)
-    if len(people_m) == 0 or away[0] > LEAVES_M or away.max() <= LEAVES_M:
-        return float("nan")
-    left = int(np.argmax(away > LEAVES_M))
-    share = (LEAVES_M - away[left - 1]) / (away[left] - away[left - 1])
-    where = line_m[left - 1] + share * (line_m[left] - line_m[left - 1])
-    person = float(line_locate_point(nominal, points(people_m)).min())
-    return person - float(line_locate_point(nominal, points(where)))
+    values: dict[str, float] = {}
+    reasons: dict[str, str] = {}
+    for metric in metrics:
+        if metric.near is not None or (metric.drive is not None and drive is None):
+            continue
+        reason = metric.reason(missing)
+        value = float("nan")
+        if reason is None and metric.lines is not None:
+            value = float(metric.lines(lines)[0])
+        elif reason is None and metric.drive is not None and drive is not None:
+            value = metric.drive(drive)
+        values[metric.name] = value
+        if not np.isfinite(value):
+            reasons[metric.name] = reason or metric.undefined
+    return values, reasons

@@ -1,25 +1,98 @@
 """What needs measured times or forces: speeds and their derivatives, time near people, contact."""
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.evaluation.segments import ZONES
 
 #: Positions are resampled at this rate, Hz, and smoothed by cubics over so many samples (1.1 s): derivatives of noisy
 #: positions are otherwise noise.
 RATE_HZ, WINDOW = 10.0, 11
-#: Time near people is looked at in steps of this, s.
+#: Time near people is sampled in steps of this, s.
 STEP_S = 0.02
 
 
-def motion_values(demonstration: Demonstration) -> dict[str, float]:
-    """Duration, speed, acceleration, jerk, and time in zones; NaN where times were not measured."""
-    names = ["duration_s", "speed_m_s", "acceleration_m_s2", "jerk_m_s3", *(f"{name}_s" for name, _ in ZONES)]
-    if demonstration.laid_out_m_s is not None:
-        return dict.fromkeys(names, float("nan"))
-    sizes = [float(np.hypot(*rate.T).mean()) for rate in derivatives(demonstration.t_s, demonstration.xy_m)]
-    return dict(zip(names, [demonstration.duration_s, *sizes, *_zone_times(demonstration)], strict=True))
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A demonstration as it was driven; each property is computed when it is first used."""
+
+    demonstration: Demonstration
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first pose to the last, s."""
+        return self.demonstration.duration_s
+
+    @property
+    def speed_m_s(self) -> float:
+        """Mean magnitude of the velocity, m/s; NaN where the path is too short for derivatives."""
+        return _mean_magnitude(self._rates[0])
+
+    @property
+    def acceleration_m_s2(self) -> float:
+        """Mean magnitude of the acceleration, m/s^2; NaN as for the speed."""
+        return _mean_magnitude(self._rates[1])
+
+    @property
+    def jerk_m_s3(self) -> float:
+        """Mean magnitude of the jerk, m/s^3; NaN as for the speed."""
+        return _mean_magnitude(self._rates[2])
+
+    @cached_property
+    def zones_s(self) -> FloatArray:
+        """(4,) time in each of ZONES, s; needs people."""
+        d = self.demonstration
+        count = max(1, round(d.duration_s / STEP_S))
+        at = (np.arange(count) + 0.5) / count * d.duration_s + d.t_s[0]
+        x, y = (np.interp(at, d.t_s, axis) for axis in d.xy_m.T)
+        distance = np.min([np.hypot(x - person[0], y - person[1]) for person in d.people_m], axis=0) - d.robot_radius_m
+        limits = np.array([limit for _, limit in ZONES])
+        zone = (distance[:, None] >= limits).sum(axis=1)
+        inside: FloatArray = np.bincount(zone, minlength=len(ZONES))[: len(ZONES)] * d.duration_s / count
+        return inside
+
+    @property
+    def contact_share(self) -> float:
+        """Share of the time in contact; needs a wrench."""
+        return sum(contact.duration_s for contact in self._contacts) / self.demonstration.duration_s
+
+    @property
+    def peak_force_n(self) -> float:
+        """Largest horizontal force in contact, N, 0 without contact; needs a wrench."""
+        return max((contact.peak_force_n for contact in self._contacts), default=0.0)
+
+    @property
+    def impulse_n_s(self) -> float:
+        """Sum over the contacts of the magnitude of the impulse, N s; needs a wrench."""
+        return sum(float(np.hypot(*contact.impulse_n_s)) for contact in self._contacts)
+
+    @cached_property
+    def work_j(self) -> float:
+        """Integral of force times velocity over the contacts, J; needs a wrench; NaN as for the speed."""
+        d, velocity = self.demonstration, self._rates[0]
+        if d.force_n is None or not np.isfinite(velocity).all():
+            return float("nan")
+        at = d.t_s[0] + np.arange(len(velocity)) / RATE_HZ
+        there = np.stack([np.interp(d.t_s, at, axis) for axis in velocity.T], axis=1)
+        power = (d.force_n * there).sum(axis=1)
+        total = 0.0
+        for contact in self._contacts:
+            inside = (d.t_s > contact.start_s) & (d.t_s < contact.end_s)
+            t = np.concatenate([[contact.start_s], d.t_s[inside], [contact.end_s]])
+            total += float(np.trapezoid(np.interp(t, d.t_s, power), t))
+        return total
+
+    @property
+    def _contacts(self) -> tuple[Contact, ...]:
+        return self.demonstration.contacts or ()
+
+    @cached_property
+    def _rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return derivatives(self.demonstration.t_s, self.demonstration.xy_m)
 
 
 def derivatives(t_s: FloatArray, xy_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -37,8 +110,8 @@ def derivatives(t_s: FloatArray, xy_m: FloatArray) -> tuple[FloatArray, FloatArr
 
     at = np.arange(t_s[0], t_s[-1] + 1e-9, 1 / RATE_HZ)
     if len(at) < WINDOW:
-        nothing = np.full((1, 2), np.nan)
-        return nothing, nothing, nothing
+        missing = np.full((1, 2), np.nan)
+        return missing, missing, missing
     line = np.stack([np.interp(at, t_s, axis) for axis in xy_m.T], axis=1)
     velocity, acceleration, jerk = (
         savgol_filter(line, WINDOW, 3, deriv=order, delta=1 / RATE_HZ, axis=0) for order in (1, 2, 3)
@@ -46,43 +119,6 @@ def derivatives(t_s: FloatArray, xy_m: FloatArray) -> tuple[FloatArray, FloatArr
     return velocity, acceleration, jerk
 
 
-def _zone_times(d: Demonstration) -> list[float]:
-    """Time in each zone, s."""
-    if len(d.people_m) == 0:
-        return [float("nan")] * len(ZONES)
-    count = max(1, round(d.duration_s / STEP_S))
-    at = (np.arange(count) + 0.5) / count * d.duration_s + d.t_s[0]
-    x, y = (np.interp(at, d.t_s, axis) for axis in d.xy_m.T)
-    distance = np.min([np.hypot(x - person[0], y - person[1]) for person in d.people_m], axis=0) - d.robot_radius_m
-    limits = np.array([limit for _, limit in ZONES])
-    zone = (distance[:, None] >= limits).sum(axis=1)
-    inside = np.bincount(zone, minlength=len(ZONES))[: len(ZONES)]
-    return [float(steps) * d.duration_s / count for steps in inside]
-
-
-def contact_values(d: Demonstration) -> dict[str, float]:
-    """Share of time, peak, impulse and work of the person's pushes; NaN where contact is unknown."""
-    names = ("contact_share", "peak_n", "impulse_ns", "work_j")
-    if d.contacts is None or d.contact_s is None or d.force_n is None:
-        return dict.fromkeys(names, float("nan"))
-    peak = max((contact.peak_force_n for contact in d.contacts), default=0.0)
-    impulse = sum(float(np.hypot(*contact.impulse_n_s)) for contact in d.contacts)
-    return dict(zip(names, (d.contact_s / d.duration_s, peak, impulse, _work_j(d)), strict=True))
-
-
-def _work_j(d: Demonstration) -> float:
-    """Integral of force times velocity over the contacts, J; NaN where times were not measured."""
-    if d.laid_out_m_s is not None or d.force_n is None:
-        return float("nan")
-    velocity, _, _ = derivatives(d.t_s, d.xy_m)
-    if not np.isfinite(velocity).all():
-        return float("nan")
-    at = d.t_s[0] + np.arange(len(velocity)) / RATE_HZ
-    there = np.stack([np.interp(d.t_s, at, axis) for axis in velocity.T], axis=1)
-    power = (d.force_n * there).sum(axis=1)
-    total = 0.0
-    for contact in d.contacts or ():
-        inside = (d.t_s > contact.start_s) & (d.t_s < contact.end_s)
-        t = np.concatenate([[contact.start_s], d.t_s[inside], [contact.end_s]])
-        total += float(np.trapezoid(np.interp(t, d.t_s, power), t))
-    return total
+def _mean_magnitude(rate: FloatArray) -> float:
+    """Mean magnitude of (k, 2) vectors."""
+    return float(np.hypot(*rate.T).mean())

@@ -1,13 +1,14 @@
-"""Properties of a policy's paths: of drawn ones, all at once, and expected values where visits give them exactly."""
+"""Paths of a policy: drawn ones measured all at once, expected values from visits, distances to a demonstrated path."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.demos.grid import MOVES, TURN_RAD, moves_along
-from navirl_cli.evaluation.metrics import areas_m2
-from navirl_cli.evaluation.segments import ZONES, Segments, segments
+from navirl_cli.evaluation.lines import Lines
+from navirl_cli.evaluation.segments import Segments
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.paths import SampledPaths
 from navirl_cli.irl.values import Policy
@@ -15,120 +16,160 @@ from navirl_cli.irl.values import Policy
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """What every step of a lattice adds to a path's properties."""
+    """What every step of a lattice adds to the properties of a path."""
 
     lattice: Lattice
-    #: Arrays of shape (n, 8); steps that are not possible hold no meaning.
-    segments: Segments
+    #: (p, 2) m.
+    people_m: FloatArray
+    #: Subtracted from distances, m.
+    robot_radius_m: float
+
+    @cached_property
+    def segments(self) -> Segments:
+        """Arrays of shape (n, 8); those of impossible steps hold no meaning."""
+        start = np.broadcast_to(self.lattice.xy_m[:, None], (self.lattice.size, 8, 2))
+        end = start + MOVES * self.lattice.grid.resolution_m
+        return Segments(start, end, self.people_m, self.robot_radius_m)
+
+
+@dataclass(frozen=True, eq=False)
+class PolicyLines(Lines):
+    """Paths drawn from a policy, through the centres of cells: their steps are looked up, not measured again."""
+
+    steps: Steps
+    paths: SampledPaths
 
     @staticmethod
-    def of(lattice: Lattice, people_m: FloatArray, robot_radius_m: float) -> "Steps":
-        """Measure all steps.
+    def of(steps: Steps, paths: SampledPaths, nominal_m: FloatArray) -> "PolicyLines":
+        """Drawn paths as lines.
 
         Args:
-            lattice: The states.
-            people_m: (p, 2) m.
-            robot_radius_m: Taken off distances, m.
-        """
-        start = np.broadcast_to(lattice.xy_m[:, None], (lattice.size, 8, 2))
-        end = start + MOVES * lattice.grid.resolution_m
-        return Steps(lattice, segments(start, end, people_m, robot_radius_m))
-
-    def expected(self, policy: Policy, start: int) -> dict[str, float]:
-        """Exact expected values of what adds up along a path.
-
-        Args:
-            policy: On the same lattice.
-            start: State in which paths start.
-
-        Returns:
-            length_m, heading_rad, and the way in each zone, as NAME_m.
-        """
-        flow = policy.visits_from(start)[:, None] * policy.probability
-        found = {"length_m": float((flow * self.lattice.step_m).sum())}
-        nobody = bool(np.isnan(self.segments.least_m).all())
-        for number, (name, _) in enumerate(ZONES):
-            way = float((flow * self.segments.zones_m[..., number]).sum())
-            found[f"{name}_m"] = float("nan") if nobody else way
-        # The next move is drawn in the state where this one ends; none is in the goal.
-        turns = policy.probability @ TURN_RAD
-        possible = flow > 0
-        after = np.where(possible, self.lattice.neighbours, 0)
-        found["heading_rad"] = float(
-            (flow * np.take_along_axis(turns[after], np.arange(8)[None, :, None], 2)[..., 0]).sum()
-        )
-        return found
-
-    def measured(self, paths: SampledPaths, nominal_m: FloatArray) -> dict[str, FloatArray]:
-        """Properties of drawn paths.
-
-        Args:
-            paths: On the same lattice.
+            steps: Of the lattice on which the paths were drawn.
+            paths: The paths.
             nominal_m: (k, 2) m.
-
-        Returns:
-            (paths,) values by name: all that follow from a line and the people.
         """
-        found = additive(self, paths)
-        length = found["length_m"]
-        found["area_m2"] = areas_m2(self.lattice.xy_m[paths.states], nominal_m)
-        found["curvature_1_m"] = found["heading_rad"] / length
-        found["compliance"] = 1 - found["intimate_m"] / length
-        return found | {f"{name}_share": found[f"{name}_m"] / length for name, _ in ZONES}
+        lines = steps.lattice.xy_m[paths.states]
+        return PolicyLines(lines, nominal_m, steps.people_m, steps.robot_radius_m, steps, paths)
 
+    @cached_property
+    def length_m(self) -> FloatArray:
+        """(m,) path length, m."""
+        length: FloatArray = np.where(self._driven, self.steps.lattice.step_m[self._moves], 0.0).sum(axis=1)
+        return length
 
-def additive(steps: Steps, paths: SampledPaths) -> dict[str, FloatArray]:
-    """Properties that follow from the steps one by one, by name, (paths,) each."""
-    here, moves = paths.states[:, :-1], moves_along(steps.lattice.cells[paths.states])
-    driven = moves >= 0
-    parts = steps.segments
+    @cached_property
+    def min_distance_m(self) -> FloatArray:
+        """(m,) smallest distance between the robot's shell and a person's centre, m; needs people."""
+        least = self.steps.segments.least_m[self._here, self._moves]
+        smallest: FloatArray = np.where(self._driven, least, np.inf).min(axis=1)
+        return smallest
 
-    def total(values: FloatArray) -> FloatArray:
-        summed: FloatArray = np.where(driven, values[here, moves], 0.0).sum(axis=1)
+    @cached_property
+    def zones_m(self) -> FloatArray:
+        """(m, 4) path length in each of ZONES, m; needs people."""
+        zones = np.moveaxis(self.steps.segments.zones_m, -1, 0)
+        return np.stack([self._total(one) for one in zones], axis=1)
+
+    @cached_property
+    def mean_distance_m(self) -> FloatArray:
+        """(m,) mean along the path of the distance between shell and nearest person, m; needs people."""
+        return self._total(self.steps.segments.distance_m2) / self.length_m
+
+    @cached_property
+    def heading_rad(self) -> FloatArray:
+        """(m,) sum of the absolute changes of direction from move to move, rad."""
+        both = self._driven[:, 1:] & self._driven[:, :-1]
+        turned: FloatArray = np.where(both, TURN_RAD[self._moves[:, :-1], self._moves[:, 1:]], 0.0).sum(axis=1)
+        return turned
+
+    @cached_property
+    def _moves(self) -> IntArray:
+        """(m, n - 1) numbers of the moves; -1 where a path stays in the goal."""
+        return moves_along(self.steps.lattice.cells[self.paths.states])
+
+    @property
+    def _driven(self) -> BoolArray:
+        """(m, n - 1) whether a path moves."""
+        return self._moves >= 0
+
+    @property
+    def _here(self) -> IntArray:
+        """(m, n - 1) states from which a path moves."""
+        return self.paths.states[:, :-1]
+
+    def _total(self, values: FloatArray) -> FloatArray:
+        """(m,) sums along the paths of (n, 8) values of steps."""
+        summed: FloatArray = np.where(self._driven, values[self._here, self._moves], 0.0).sum(axis=1)
         return summed
 
-    length = np.where(driven, steps.lattice.step_m[moves], 0.0).sum(axis=1)
-    both = driven[:, 1:] & driven[:, :-1]
-    turned = np.where(both, TURN_RAD[moves[:, :-1], moves[:, 1:]], 0.0).sum(axis=1)
-    found = {
-        "length_m": length,
-        "min_distance_m": np.where(driven, parts.least_m[here, moves], np.inf).min(axis=1),
-        "mean_distance_m": total(parts.distance_m2) / length,
-        "heading_rad": turned,
-    }
-    for number, (name, _) in enumerate(ZONES):
-        found[f"{name}_m"] = total(parts.zones_m[..., number])
-    if np.isnan(parts.least_m).all():  # nobody is there
-        about_people = ("min_distance_m", "mean_distance_m", *(f"{name}_m" for name, _ in ZONES))
-        found |= dict.fromkeys(about_people, np.full(len(length), np.nan))
-    return found
+
+@dataclass(frozen=True, eq=False)
+class Visits:
+    """Exact expected values of what adds up along the paths of a policy, from its visits."""
+
+    steps: Steps
+    #: On the same lattice.
+    policy: Policy
+    #: State in which paths start.
+    start: int
+
+    @property
+    def length_m(self) -> float:
+        """Expected path length, m."""
+        return float((self._flow * self.steps.lattice.step_m).sum())
+
+    @property
+    def zones_m(self) -> FloatArray:
+        """(4,) expected path length in each of ZONES, m; needs people."""
+        zones: FloatArray = np.einsum("sm,smz->z", self._flow, self.steps.segments.zones_m)
+        return zones
+
+    @property
+    def heading_rad(self) -> float:
+        """Expected sum of the absolute changes of direction, rad."""
+        # The next move is drawn in the state where this one ends; none is in the goal.
+        turns = self.policy.probability @ TURN_RAD
+        after = np.where(self._flow > 0, self.steps.lattice.neighbours, 0)
+        turned = np.take_along_axis(turns[after], np.arange(8)[None, :, None], 2)[..., 0]
+        return float((self._flow * turned).sum())
+
+    @cached_property
+    def _flow(self) -> FloatArray:
+        """(n, 8) expected number of times that each step is taken."""
+        flow: FloatArray = self.policy.visits_from(self.start)[:, None] * self.policy.probability
+        return flow
 
 
-def nearness(line_m: FloatArray, paths: SampledPaths, lattice: Lattice) -> dict[str, FloatArray]:
-    """Compare a demonstrated path through centres of cells with drawn paths on the same cells.
+@dataclass(frozen=True, eq=False)
+class Nearness:
+    """How far a demonstrated path and drawn ones are from each other, all through the centres of cells.
 
-    Distances are from centres of cells to the other path's segments; the mean is over the cells that a path passes.
-
-    Args:
-        line_m: (k, 2) m, centres of the demonstrated path's cells.
-        paths: Drawn from a policy.
-        lattice: Their states.
-
-    Returns:
-        (paths,) each: to_learnt_m, from_learnt_m, dissimilarity_m, hausdorff_m.
+    Distances are from the centres of a path's cells to the other path's segments.
     """
-    from shapely import LineString, distance, linestrings, points
 
-    # Whatever a drawn path passes is a cell, whose distance to the demonstrated path is known once.
-    seen = np.unique(paths.states)
-    away = np.zeros(lattice.size)
-    away[seen] = distance(points(lattice.xy_m[seen]), LineString(line_m))
-    on_the_way = np.arange(paths.states.shape[1]) < paths.lengths[:, None]
-    back = np.where(on_the_way, away[paths.states], 0.0).sum(axis=1) / paths.lengths
-    there = distance(points(line_m)[None, :], linestrings(lattice.xy_m[paths.states])[:, None]).mean(axis=1)
-    return {
-        "to_learnt_m": there,
-        "from_learnt_m": back,
-        "dissimilarity_m": (there + back) / 2,
-        "hausdorff_m": np.maximum(there, back),
-    }
+    #: (k, 2) m, centres of the demonstrated path's cells.
+    demonstrated_m: FloatArray
+    lattice: Lattice
+    paths: SampledPaths
+
+    @cached_property
+    def to_learnt_m(self) -> FloatArray:
+        """(m,) mean over the demonstrated cells of the distance to each drawn path, m."""
+        from shapely import distance, linestrings, points
+
+        lines = linestrings(self.lattice.xy_m[self.paths.states])
+        mean: FloatArray = distance(points(self.demonstrated_m)[None, :], lines[:, None]).mean(axis=1)
+        return mean
+
+    @cached_property
+    def from_learnt_m(self) -> FloatArray:
+        """(m,) mean over the cells of each drawn path of the distance to the demonstrated one, m."""
+        from shapely import LineString, distance, points
+
+        # Drawn paths share cells: the distance of each cell is measured once.
+        seen = np.unique(self.paths.states)
+        away = np.zeros(self.lattice.size)
+        away[seen] = distance(points(self.lattice.xy_m[seen]), LineString(self.demonstrated_m))
+        on_path = np.arange(self.paths.states.shape[1]) < self.paths.lengths[:, None]
+        mean: FloatArray = np.where(on_path, away[self.paths.states], 0.0).sum(axis=1) / self.paths.lengths
+        return mean

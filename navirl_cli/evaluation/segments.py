@@ -1,6 +1,7 @@
-"""What the segments of paths add to a path's properties: length, distance to people, way in zones around them."""
+"""What the segments of paths add to their properties: length, distance to people, path length in zones around them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,56 +14,73 @@ ZONES: tuple[tuple[str, float], ...] = (
     ("social", 3.6),
     ("public", float("inf")),
 )
-#: Distances along a segment are looked at in so many pieces: of a cell's diagonal 9 mm each.
+#: Distances along a segment are sampled in so many pieces: of a cell's diagonal 9 mm each.
 PIECES = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Properties of straight segments, arrays of one shape (...)."""
+    """Properties of straight segments, arrays of one shape (...), each computed when it is first used."""
 
-    length_m: FloatArray
-    #: Least distance between the robot's shell and a person's centre, m; NaN where there is nobody.
-    least_m: FloatArray
-    #: Integral of the distance to the nearest person over the way, m^2; NaN where there is nobody.
-    distance_m2: FloatArray
-    #: (..., 4) way in each of ZONES, m; zeros where there is nobody.
-    zones_m: FloatArray
+    #: (..., 2) m.
+    start_m: FloatArray
+    end_m: FloatArray
+    #: (p, 2) m.
+    people_m: FloatArray
+    #: Subtracted from the distance between centres, m.
+    robot_radius_m: float
 
+    @cached_property
+    def length_m(self) -> FloatArray:
+        """Length of each segment, m."""
+        length: FloatArray = np.hypot(self._along[..., 0], self._along[..., 1])
+        return length
 
-def segments(start_m: FloatArray, end_m: FloatArray, people_m: FloatArray, robot_radius_m: float) -> Segments:
-    """Measure segments.
+    @cached_property
+    def least_m(self) -> FloatArray:
+        """Smallest distance between the robot's shell and a person's centre, m, exact; NaN without people."""
+        if len(self.people_m) == 0:
+            return np.full(self.length_m.shape, np.nan)
+        squared = np.maximum((self._along**2).sum(axis=-1), 1e-300)
+        least = np.full(self.length_m.shape, np.inf)
+        for person in self.people_m:
+            share = np.clip(((person - self.start_m) * self._along).sum(axis=-1) / squared, 0.0, 1.0)
+            away = self.start_m + share[..., None] * self._along - person
+            least = np.minimum(least, np.hypot(away[..., 0], away[..., 1]))
+        return least - self.robot_radius_m
 
-    The least distance is exact; integrals and zones are sums over pieces.
+    @property
+    def distance_m2(self) -> FloatArray:
+        """Integral of the distance to the nearest person along the segment, m^2; NaN without people."""
+        return self._sampled[0]
 
-    Args:
-        start_m: (..., 2) m.
-        end_m: (..., 2) m.
-        people_m: (p, 2) m.
-        robot_radius_m: Taken off the distance between centres, m.
-    """
-    along = end_m - start_m
-    length = np.hypot(along[..., 0], along[..., 1])
-    if len(people_m) == 0:
-        nothing = np.full(length.shape, np.nan)
-        return Segments(length, nothing, nothing, np.zeros((*length.shape, len(ZONES))))
-    squared = np.maximum((along**2).sum(axis=-1), 1e-300)
-    least = np.full(length.shape, np.inf)
-    for person in people_m:
-        share = np.clip(((person - start_m) * along).sum(axis=-1) / squared, 0.0, 1.0)
-        away = start_m + share[..., None] * along - person
-        least = np.minimum(least, np.hypot(away[..., 0], away[..., 1]))
-    total = np.zeros(length.shape)
-    zones = np.zeros((*length.shape, len(ZONES)))
-    limits = np.array([limit for _, limit in ZONES])
-    for piece in range(PIECES):
-        middle = start_m + (piece + 0.5) / PIECES * along
-        distance = np.full(length.shape, np.inf)
-        for person in people_m:
-            distance = np.minimum(distance, np.hypot(middle[..., 0] - person[0], middle[..., 1] - person[1]))
-        distance -= robot_radius_m
-        total += distance
-        # below the first limit: zone 0
-        zone = (distance[..., None] >= limits).sum(axis=-1)
-        zones += zone[..., None] == np.arange(len(ZONES))
-    return Segments(length, least - robot_radius_m, total * length / PIECES, zones * length[..., None] / PIECES)
+    @property
+    def zones_m(self) -> FloatArray:
+        """(..., 4) path length in each of ZONES, m; NaN without people."""
+        return self._sampled[1]
+
+    @cached_property
+    def _along(self) -> FloatArray:
+        """(..., 2) from start to end, m."""
+        return self.end_m - self.start_m
+
+    @cached_property
+    def _sampled(self) -> tuple[FloatArray, FloatArray]:
+        """Integral of distances and path lengths in zones, as sums over pieces."""
+        shape = self.length_m.shape
+        if len(self.people_m) == 0:
+            return np.full(shape, np.nan), np.full((*shape, len(ZONES)), np.nan)
+        total = np.zeros(shape)
+        zones = np.zeros((*shape, len(ZONES)))
+        limits = np.array([limit for _, limit in ZONES])
+        for piece in range(PIECES):
+            middle = self.start_m + (piece + 0.5) / PIECES * self._along
+            distance = np.full(shape, np.inf)
+            for person in self.people_m:
+                distance = np.minimum(distance, np.hypot(middle[..., 0] - person[0], middle[..., 1] - person[1]))
+            distance -= self.robot_radius_m
+            total += distance
+            # Below the first limit: zone 0.
+            zone = (distance[..., None] >= limits).sum(axis=-1)
+            zones += zone[..., None] == np.arange(len(ZONES))
+        return total * self.length_m / PIECES, zones * self.length_m[..., None] / PIECES

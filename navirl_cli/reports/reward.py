@@ -13,8 +13,9 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.tables import Column, Table
 from navirl_cli.evaluation.compare import Comparison
+from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
-from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, center_distance_m
+from navirl_cli.evaluation.metrics import BY_NAME, PAPERMETRICS
 from navirl_cli.evaluation.ranks import Rank
 from navirl_cli.reports.evaluation import group_table, uniform_line
 from navirl_cli.reports.extraction import trial_table
@@ -41,7 +42,7 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: Beside the paper's three, where they are known.
-_METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
+METRICS = [*PAPERMETRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 #: Rank below which a demonstration is reported as rare.
 _RARE = 0.01
 
@@ -86,7 +87,7 @@ def report_of(
         Heading("Learnt policy"),
         *_pictures(figures, "policy"),
         Heading("Path metrics"),
-        group_table(result, _METRICS),
+        group_table(result, METRICS),
         *_pictures(figures, "properties", "paths"),
         Heading("Ranks of the demonstrations"),
         Paragraph(f"R{uniform_line(ranks)[1:]}. Demonstrations that the reward was learnt from are included."),

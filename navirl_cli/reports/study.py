@@ -9,7 +9,8 @@ import numpy as np
 from navirl_cli import __version__
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
-from navirl_cli.evaluation.metrics import LEAVES_M, PAPER_METRICS
+from navirl_cli.evaluation.lines import LEAVES_M
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status

@@ -63,7 +63,7 @@ def properties_table(groups: Sequence[GroupMetrics]) -> Table:
             continue
         names = [*(m.name for m in PAPER_METRICS), "min_center_distance_m", "onset_m"]
         own = [plus_minus(row.mean[name], row.std[name], 3) for name in names]
-        own[-1] += f" ({row.counts['onset_m']})" if row.counts["onset_m"] else ""
+        own[-1] += f" ({row.count_of('onset_m')})" if row.count_of("onset_m") else ""
         rows.append((row.group, str(row.count), *own))
     return Table.of_texts(header, tuple(rows), "Driven paths, mean ± standard deviation over paths.")
 

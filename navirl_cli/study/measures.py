@@ -5,30 +5,26 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, nominal_of
+from navirl_cli.evaluation.compare import DRIVEN, ON_GRID, measured, nominal_of
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
-from navirl_cli.evaluation.metrics import onset_m, paper_values
-from navirl_cli.irl.scene import Scene, scenes_of
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
+from navirl_cli.irl.scene import scenes_of
+
+#: What the paper and its claims need.
+STUDY_METRICS = (*PAPER_METRICS, BY_NAME["min_center_distance_m"], BY_NAME["onset_m"])
 
 
-def measured(demonstrations: Sequence[Demonstration]) -> list[Measured]:
+def rows_of(demonstrations: Sequence[Demonstration]) -> list[Measured]:
     """Measure every path as driven and through the centres of its cells, comparable with learnt paths.
 
     Raises:
         SceneError: A demonstration's scene has no path from start to goal.
     """
-    return [_measured(one, scene) for one, scene in zip(demonstrations, scenes_of(demonstrations), strict=True)]
-
-
-def _measured(one: Demonstration, scene: Scene) -> Measured:
-    nominal = nominal_of(one, scene)
-    driven, on_grid = (
-        dict(paper_values(line, nominal, one.people_m, one.robot_radius_m))
-        for line in (one.xy_m, one.grid.centres_of(one.cells))
-    )
-    driven["min_center_distance_m"] = driven["min_distance_m"] + one.robot_radius_m
-    driven["onset_m"] = onset_m(one.xy_m, nominal, one.people_m)
-    return Measured(one.id, one.participant, group_of(one), {DRIVEN: driven, ON_GRID: on_grid})
+    found = []
+    for one, scene in zip(demonstrations, scenes_of(demonstrations), strict=True):
+        lines = {DRIVEN: one.xy_m, ON_GRID: one.grid.centres_of(one.cells)}
+        found.append(measured(one, lines, nominal_of(one, scene), STUDY_METRICS, group_of(one)))
+    return found
 
 
 def with_people(rows: Iterable[Measured]) -> list[Measured]:

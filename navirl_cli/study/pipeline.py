@@ -13,7 +13,7 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.parallel import map_in_order
 from navirl_cli.study.claims import Claim, claims_of
 from navirl_cli.study.learning import SECOND, Learnt, is_of_cycle, jobs_of, learn
-from navirl_cli.study.measures import groups_of, measured
+from navirl_cli.study.measures import groups_of, rows_of
 
 #: What the paper's authors learnt from the second cycles of their 13 participants, in SI units. Source: their published
 #: parameters c0 = -5.412586, a_g = -0.873514, a_p = -4.907188 and a width of 5.456288 cells, per cell of 0.1 m.
@@ -82,7 +82,7 @@ def study_of(
         if progress is not None:
             progress(len(learnt), one.participant or "all")
     participants, pooled = tuple(learnt[:-1]), learnt[-1]
-    rows = tuple(measured(demonstrations))
+    rows = tuple(rows_of(demonstrations))
     return Study(
         demonstrations=tuple(demonstrations),
         rows=rows,
