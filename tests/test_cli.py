@@ -124,13 +124,13 @@ def test_extract_json_has_numbers(navirl, tmp_path):
         ({}, ("--topic", "lidar=/scan"), "--topic: no role is called lidar; roles are wrench, odometry, map"),
         ({"map_to_odom": False}, (), "/odom places 'base' in frame 'odom': transform from 'odom' to 'map'"),
         ({"sensor_mounted": False}, (), "the wrench is given in frame 'sensor': transform from 'sensor' to 'base'"),
-        ({"map_yaw": 0.5}, (), "expected a map whose cells run along its frame's axes, found one turned by 28.6 deg"),
+        ({"map_yaw": 0.5}, (), "expected a map whose cells run along its frame's axes, found one rotated by 28.6 deg"),
         ({"moves": False}, (), "no trial became a demonstration"),
         ({"goals": ()}, (), "no goal is announced, so that trials cannot be split at goals"),
         ({}, ("--person", "0,0.1"), "a person at x 0.00 m, y 0.10 m stands on the path's start"),
         ({}, ("-o", "/dev/null"), "/dev/null: expected the name of a file to write, found something else"),
         ({}, ("-o", "x" * 300), "cannot be written: File name too long"),
-        ({}, ("--goal", "50,50"), "goal unreachable: no free way on the map from x"),
+        ({}, ("--goal", "50,50"), "goal unreachable: no free path on the map from x"),
         ({}, ("-o", "no/demos.json"), "no/demos.json: expected an existing folder, found none at no; create it"),
     ],
 )
@@ -210,14 +210,14 @@ def test_ids_stay_with_the_trials_when_some_are_skipped_and_notes_name_them(navi
     ids = [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]]
     assert ids == ["ann/3", "ann/4"]
     assert "a.mcap: trials 1, 2: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
-    assert "navirl: ann/4: 5 driven cells that the map calls occupied were freed" in result.stderr
+    assert "navirl: ann/4: 5 driven cells that are occupied on the map were freed" in result.stderr
 
 
 def test_notes_go_to_stderr(navirl, tmp_path):
     log = log_with(tmp_path, obstacles=((30, 17),), people=None)
     stderr = navirl("extract", log, "-o", "demos.json").stderr
-    assert "navirl: run/1: 5 driven cells that the map calls occupied were freed" in stderr
-    assert "run/1: no people in the scene; say where they stand with --person x,y" in stderr
+    assert "navirl: run/1: 5 driven cells that are occupied on the map were freed" in stderr
+    assert "run/1: no people in the scene; give their places with --person x,y" in stderr
 
 
 @pytest.mark.parametrize(

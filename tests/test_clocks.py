@@ -14,7 +14,7 @@ from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order
 
 OTHER = "run.mcap: /wrench is stamped by another clock than /odom: "
-WILD = "run.mcap: 1 messages on {topic} have stamps more than 1 s off their clock; the time of their receipt stands in"
+WILD = "run.mcap: 1 messages on {topic} have stamps more than 1 s off their clock; their times of receipt are used"
 
 
 @pytest.fixture
@@ -118,10 +118,10 @@ def test_without_any_stamps_times_of_receipt_are_used(load):
 def test_some_stamps_of_0_are_received_times(load):
     recording = load(**everywhere(lambda seconds: np.where(seconds < 1.5, 0, nav.simulated(100.0)(seconds))))
     assert recording.notes == (
-        "run.mcap: 15 transforms map -> odom cannot be true, or were sent before the clock ran; ignored",
+        "run.mcap: 15 transforms map -> odom are implausible, or were sent before the clock ran; ignored",
         "run.mcap: 10 poses lie outside the time that tf covers; left out",
-        "run.mcap: 30 messages on /odom are stamped 0; the time of their receipt stands in",
-        "run.mcap: 150 messages on /wrench are stamped 0; the time of their receipt stands in",
+        "run.mcap: 30 messages on /odom are stamped 0; their times of receipt are used",
+        "run.mcap: 150 messages on /wrench are stamped 0; their times of receipt are used",
     )
     # tf begins late: poses up to a second earlier are placed by its first word
     assert (recording.t_ns[0] - nav.simulated(100.0)(0)) / 1e9 == pytest.approx(0.5, abs=0.02)
@@ -143,7 +143,8 @@ def test_a_clock_that_jumps_is_made_to_continue(load, by_s):
     recording = load(**everywhere(jumping((8.0, by_s))))
     (note,) = recording.notes
     assert (
-        note == f"run.mcap: the clock jumps by {by_s:+.2f} s 7.9 s after the start; what follows was moved to continue"
+        note
+        == f"run.mcap: the clock jumps by {by_s:+.2f} s 7.9 s after the start; later times were shifted to continue"
     )
     assert (recording.t_ns[-1] - recording.t_ns[0]) / 1e9 == pytest.approx(19.95, abs=0.01)
     check_aligned(recording, 0.01)
@@ -156,7 +157,7 @@ def test_a_simulation_that_is_started_twice_more(load):
     recording = load(**everywhere(shown))
     for note, by_s, at_s in zip(recording.notes, (-107, -7), (6.9, 14.0), strict=True):
         found = re.fullmatch(
-            r"run.mcap: the clock jumps by (\S+) s (\S+) s after the start; what follows was moved to continue", note
+            r"run.mcap: the clock jumps by (\S+) s (\S+) s after the start; later times were shifted to continue", note
         )
         assert float(found[1]) == pytest.approx(by_s, abs=0.02)
         assert float(found[2]) == pytest.approx(at_s, abs=0.1)

@@ -70,7 +70,7 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
 def test_a_threshold_within_the_noise_is_told(make):
     settings = ExtractSettings(push=PushSettings(begins_n=0.2))
     (note,) = extract(make(), settings).notes
-    assert note.startswith("run.mcap: without contact the force still shakes by 0.0")
+    assert note.startswith("run.mcap: without contact the force varies by 0.0")
     assert "contacts from 0.2 N on may be noise; raise `contact_force` to 0." in note
 
 
@@ -100,7 +100,10 @@ def test_a_broken_session_record_is_told(make, trials):
 
 def test_an_unknown_condition_is_told_and_the_trial_skipped(make):
     entry = {"t_ns": START_NS, "condition": "telepathy"}
-    with pytest.raises(DemonstrationError, match=r"unknown condition 'telepathy'.* known are force, joystick, autonom"):
+    with pytest.raises(
+        DemonstrationError,
+        match=r"expected a condition \(force, joystick, autonomous, unknown\), found 'telepathy'; correct it",
+    ):
         extract(make(session={"trials": json.dumps([entry])}), ExtractSettings())
 
 
@@ -122,7 +125,7 @@ def test_a_new_goal_on_the_way_starts_a_trial(make):
 def test_a_goal_that_cannot_be_reached_is_told(make):
     for goal in ((1.5, 40.0, 0.0), (1.5, 3.0, 1.2)):
         walls = tuple((column, 25) for column in range(60))
-        with pytest.raises(DemonstrationError, match=r"goal unreachable: no free way on the map from x -?0\.00 m"):
+        with pytest.raises(DemonstrationError, match=r"goal unreachable: no free path on the map from x -?0\.00 m"):
             extract(make(goals=(goal,), obstacles=walls), ExtractSettings(robot_radius_m=0.2))
 
 
@@ -141,7 +144,7 @@ def test_goal_and_people_can_be_said(make):
     assert d.goal_m == (4.0, 0.0)
     assert d.people_m.tolist() == [[2.0, -1.0], [1.0, 1.0]]
     assert d.notes == ()
-    assert "no people in the scene; say where they stand with `person` x,y" in one(make(people=None)).notes
+    assert "no people in the scene; give their places with `person` x,y" in one(make(people=None)).notes
 
 
 def test_without_goals_the_error_says_what_to_do(make):
@@ -158,7 +161,7 @@ def test_driven_cells_that_the_map_calls_occupied_are_freed_and_counted(make):
     (note,) = d.notes
     count = int(note.split()[0])
     # Of the way's cells those nearer than 0.3 m to it: |dx| < sqrt(0.05) = 0.22 m.
-    assert note == f"{count} driven cells that the map calls occupied were freed"
+    assert note == f"{count} driven cells that are occupied on the map were freed"
     assert count == 5
     assert not d.grid.is_occupied(d.cells).any()
 
@@ -170,7 +173,7 @@ def test_a_loop_that_the_rule_cuts_off_is_told(make):
     way = np.concatenate([recording.xy_m[60:210], loop, recording.xy_m[210:]])
     times = recording.t_ns[0] + np.arange(len(way)) * 33_000_000
     changed = replace(recording, t_ns=times, xy_m=way, yaw_rad=np.zeros(len(way)), goal_t_ns=times[:1])
-    with pytest.raises(DemonstrationError, match=r"8\.4 m driven become 41 cells: the way crosses itself"):
+    with pytest.raises(DemonstrationError, match=r"8\.4 m driven become 41 cells: the path crosses itself"):
         extract(changed, ExtractSettings())
     kept = one(changed, rasterizer=Rule.CHAIN)
     assert kept.notes == ()
@@ -234,7 +237,7 @@ def test_a_hole_in_the_poses_or_the_wrench_is_no_trial(make):
     short = (seconds < 6.0) | (seconds > 6.3)
     gapped = replace(wrench, t_ns=wrench.t_ns[short], force_n=wrench.force_n[short])
     (note,) = extract(replace(recording, wrench=gapped), ExtractSettings()).notes
-    assert note == "run.mcap: the wrench breaks off for more than 0.1 s, 1 x; straight lines bridge it"
+    assert note == "run.mcap: gaps of more than 0.1 s in the wrench: 1; the force is interpolated linearly"
 
 
 def test_wrench_and_poses_of_different_clocks_are_told(make):

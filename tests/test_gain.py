@@ -127,7 +127,7 @@ def test_without_a_push_to_the_side_there_is_no_number(tmp_path, pushes):
     loaded = load_recording(write_run(tmp_path / "run.mcap", Run(pushes=pushes)))
     extraction = extract(loaded, ExtractSettings(gain=True))
     assert extraction.gain is None
-    assert extraction.notes[-1] == "run.mcap: no trial holds a push to the side, so that its gain is unknown"
+    assert extraction.notes[-1] == "run.mcap: the gain is unknown, because no trial holds a push to the side"
     assert extract(loaded, ExtractSettings()).notes == ()
 
 
@@ -181,7 +181,7 @@ def test_extract_without_a_push_says_so(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(pushes=()))
     result = navirl("extract", log, "-o", "demos.json", "--gain")
     assert len(result.stdout.splitlines()) == 2
-    assert "navirl: run.mcap: no trial holds a push to the side, so that its gain is unknown\n" in result.stderr
+    assert "navirl: run.mcap: the gain is unknown, because no trial holds a push to the side\n" in result.stderr
     assert read_json(Path("demos.json"), "demonstrations")["gain"] is None
     navirl("extract", log, "-o", "plain.json")
     assert "gain" not in read_json(Path("plain.json"), "demonstrations")

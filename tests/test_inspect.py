@@ -173,9 +173,9 @@ def test_what_is_missing_is_told_with_what_supplies_it(inspect, navirl, tmp_path
         "wrench": "record the force-torque sensor's topic",
         "odometry": "record the robot's odometry, usually /odom",
         "map": "give the map's file with `map`, or record it, usually /map",
-        "people": "say where they stand with `person` x,y",
-        "goal": "say where it is with `goal` x,y, or choose `split` stop or `split` none",
-        "joystick": "name the topic of velocities that a hand gave with `topic` joystick=/name",
+        "people": "give their places with `person` x,y",
+        "goal": "give it with `goal` x,y, or choose `split` stop or `split` none",
+        "joystick": "name the topic of manual velocities with `topic` joystick=/name",
         "tf": "record /tf where poses or people are not in the map's frame",
         "tf_static": "record /tf_static where the sensor is not in the robot's frame",
     }

@@ -34,7 +34,7 @@ def condition_of(recording):
 def test_goals_stamped_0_count_from_their_receipt(load):
     recording = load(goals=((1.5, 4.0, 1.0), (7.0, 4.0, 0.0)), unstamped=("/goal_pose",))
     assert (recording.goal_t_ns - START_NS).tolist() == [1_500_000_000, 7_000_000_000]
-    note = "run.mcap: 2 messages on /goal_pose are stamped 0; the time of their receipt stands in"
+    note = "run.mcap: 2 messages on /goal_pose are stamped 0; their times of receipt are used"
     assert recording.notes == (note,)
     assert len(extract(recording, ExtractSettings()).demonstrations) == 2
 
@@ -189,7 +189,7 @@ def test_a_log_of_which_something_is_lost_is_refused_where_that_is_asked(tmp_pat
     with pytest.raises(LogError) as caught:
         load_recording(path, LoadOptions(strict=True))
     assert str(caught.value) == (
-        "run.mcap: damaged, and `strict` refuses it: run.mcap: 1 messages on /odom hold implausible values "
+        "run.mcap: damaged, which `strict` refuses: run.mcap: 1 messages on /odom hold implausible values "
         "(1 not finite); left out; run.mcap: 2 messages on /wrench hold implausible values (2 not finite); "
         "left out"
     )
@@ -206,7 +206,7 @@ def test_forces_without_a_frame_are_the_robots(tmp_path):
     recording = load_recording(path)
     assert recording.wrench.to_base.tolist() == np.eye(3).tolist()
     assert recording.notes == (
-        "run.mcap: /wrench names no frame; it is taken to be 'base_link', unless `wrench_frame` says otherwise",
+        "run.mcap: /wrench names no frame; 'base_link' is assumed; name another with `wrench_frame`",
     )
     assert load_recording(path, LoadOptions(wrench_frame="base_link")).notes == ()
 

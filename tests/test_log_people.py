@@ -198,7 +198,7 @@ def test_who_was_seen_before_tf_spoke_is_placed_by_its_first_word(load):
 
 def test_people_without_stamps_count_from_their_receipt(load):
     recording = load(lambda _, s: {"/people": nav.people(0, [("ann", *walker(s))])}, late_ns=0)
-    assert recording.notes == ("run.mcap: 16 messages on /people are stamped 0; the time of their receipt stands in",)
+    assert recording.notes == ("run.mcap: 16 messages on /people are stamped 0; their times of receipt are used",)
     assert (recording.people[0].t_ns - nav.unix(SEEN_S)) / 1e9 == pytest.approx(0.0, abs=0.01)
     assert recording.people[0].xy_m[:, 0] == pytest.approx(1.0 + WALK_M_S * SEEN_S)
 

@@ -59,7 +59,7 @@ def test_a_map_in_another_frame_that_is_only_shifted(load):
 
 
 TURNED = (
-    r"^run.mcap: the map's frame 'floor' is turned against 'map' or moves in it, so that its cells cannot be kept; "
+    r"^run.mcap: the map's frame 'floor' is rotated against 'map' or moves in it, so that its cells cannot be kept; "
     r"choose `frame` floor, or give a map in 'map' with `map`$"
 )
 
@@ -89,7 +89,7 @@ def test_a_map_in_an_unknown_frame(load):
 
 def test_a_map_whose_own_cells_are_turned(load):
     with pytest.raises(
-        LogError, match=r"run.mcap: expected a map whose cells run along .* found one turned by 11.5 deg"
+        LogError, match=r"run.mcap: expected a map whose cells run along .* found one rotated by 11.5 deg"
     ):
         load(drawn(yaw=0.2))
     message = drawn()

@@ -106,13 +106,13 @@ class TestCommand:
         result = navirl("fit", "demos.json", "-o", "reward.json", "--only-corrected", code=1)
         assert "demos.json: --only-corrected: whether the person intervened is unknown of run/1" in result.stderr
         result = navirl("fit", "demos.json", "-o", "reward.json", "--steps", "contact", code=1)
-        assert "demonstration run/1: contact is unknown, since it was extracted without a wrench" in result.stderr
+        assert "demonstration run/1: contact is unknown, because it was extracted without a wrench" in result.stderr
 
     def test_times_that_were_laid_out_are_no_durations(self, navirl, tmp_path):
         log = write_run(tmp_path / "run.mcap", Run(session={"laid_out_m_s": "0.4"}))
         result = navirl("extract", log, "-o", "demos.json", "--json")
         assert json.loads(result.stdout)[0]["duration_s"] is None
-        assert "its positions came without times, and were laid out at 0.4 m/s" in result.stderr
+        assert "its positions came without times and were laid out at 0.4 m/s" in result.stderr
 
     def test_notes_of_several_logs_are_put_together(self, navirl, tmp_path):
         logs = [

@@ -74,7 +74,7 @@ def test_who_walks_has_a_track_and_the_mean_over_time_stands_for_them():
     assert ann.spread_m == pytest.approx(2.0, abs=0.01)
     (note,) = found.notes
     assert (
-        note == "person ann moves: up to 2.00 m from the mean place over the trial, which stands for them in the scene"
+        note == "person ann moves: up to 2.00 m from the mean place over the trial, which represents them in the scene"
     )
 
 
@@ -106,9 +106,9 @@ def test_messages_that_name_nobody_say_that_nobody_is_there():
 def test_a_ghost_of_the_tracker_does_not_count():
     found = seen({"1": standing(1, 1), "7": standing(4, 4, 103, 104.5), "9": standing(2, 4, 106, 106.4)})
     assert found.people_m.tolist() == [[1.0, 1.0], [4.0, 4.0]]
-    assert found.notes == ("left out, for seen in less than 20% of the time: person 9",)
+    assert found.notes == ("left out, because seen in less than 20% of the time: person 9",)
     both = seen({"1": standing(1, 1), "7": standing(4, 4, 103, 103.5), "9": standing(2, 4, 106, 106.4)})
-    assert both.notes == ("left out, for seen in less than 20% of the time: person 7, 9",)
+    assert both.notes == ("left out, because seen in less than 20% of the time: person 7, 9",)
 
 
 def test_topics_about_one_person_each_make_no_ghosts():
@@ -125,7 +125,7 @@ def test_who_is_lost_and_numbered_anew_is_one_person():
     assert track.name == "3"
     assert len(track.t_s) == len(way) - 2
     assert found.people_m == pytest.approx(np.array([[2.0, 1.0]]), abs=0.01)
-    assert found.notes[0] == "person 3 goes on as 8, 12: taken for one"
+    assert found.notes[0] == "person 3 continues as 8, 12: taken as one person"
 
 
 def test_who_coexists_or_comes_from_elsewhere_is_another():
@@ -150,7 +150,7 @@ def test_one_wrong_sight_does_not_part_a_person():
     rows[50] = (rows[50][0], 9.0, 9.0)
     found = seen({"1": rows})
     assert found.people_m.tolist() == [[2.0, 1.0]]
-    assert found.notes == ("left out, for seen in less than 20% of the time: person 1",)
+    assert found.notes == ("left out, because seen in less than 20% of the time: person 1",)
 
 
 def test_tracks_that_are_none_are_refused():
@@ -178,6 +178,6 @@ def test_a_log_with_walkers_becomes_a_demonstration_with_tracks(tmp_path):
     still, moving = d.tracks
     assert len(still.t_s) == 0
     assert moving.xy_m[:, 1] == pytest.approx(0.8 + 0.04 * (1.5 + moving.t_s), abs=0.005)
-    assert d.notes == ("left out, for seen in less than 20% of the time: person 3",)
+    assert d.notes == ("left out, because seen in less than 20% of the time: person 3",)
     (said,) = extract(loaded, ExtractSettings(people_m=((2.0, 1.0),))).demonstrations
     assert (said.people_m.tolist(), said.tracks, said.notes) == ([[2.0, 1.0]], (), ())

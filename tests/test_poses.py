@@ -186,7 +186,7 @@ def test_a_wrench_in_a_frame_that_tf_does_not_know(load):
     run = Run().odometry(frame="map", child="base")
     message = (
         r"^run.mcap: the wrench is given in frame 'base_link': transform from 'base_link' to 'base': expected .*; "
-        r"or say with `wrench_frame` which frame its axes are parallel to$"
+        r"or name a frame with parallel axes with `wrench_frame`$"
     )
     with pytest.raises(FrameError, match=message):
         load(run)

@@ -102,7 +102,7 @@ def test_avoidance_keeps_clear_of_people_and_leaves_the_nominal_path_no_further_
 def test_avoidance_without_a_way_says_so():
     scene = make.scene_on(make.open_grid(40, 5), [1, 2], [38, 2], [[2.0, 0.25]])
     with pytest.raises(
-        SceneError, match=r"goal unreachable: no free way on the map from x 0\.15 m, y 0\.25 m to x 3\.85"
+        SceneError, match=r"goal unreachable: no free path on the map from x 0\.15 m, y 0\.25 m to x 3\.85"
     ):
         avoidance_line_m(scene, 0.5)
     near = make.scene_on(make.open_grid(40, 5), [1, 2], [38, 2], [[0.2, 0.25]])

@@ -183,7 +183,7 @@ TAKEN = "; the folder's files are taken without it"
 @pytest.mark.parametrize(
     ("text", "note"),
     [
-        ("", "metadata.yaml: expected YAML with keys and values, found nothing" + TAKEN),
+        ("", "metadata.yaml: expected YAML with keys and values, found an empty file" + TAKEN),
         ("rosbag2_bagfile", "metadata.yaml: expected YAML with keys and values, found 'rosbag2_bagfile'" + TAKEN),
         ("a: [1, 2\nb: 3", "found line 2: expected ',' or ']', but got ':'" + TAKEN),
         ("a: 3\n", "metadata.yaml: key rosbag2_bagfile_information: expected keys and values, found None" + TAKEN),
@@ -229,7 +229,7 @@ def test_holes_in_the_numbers_are_told(tmp_path):
     put(*(folder / f"w_{number}.mcap" for number in (1, 2, 7, 9, 12)))
     (source,) = sources_of([folder])
     assert [file.name for file in source.files] == [f"w_{number}.mcap" for number in (1, 2, 7, 9, 12)]
-    there = "no such file, though later pieces of the recording are there; its messages"
+    there = "missing, while later pieces of the recording exist; its messages"
     assert source.damage == (
         Damage(folder / "w_0.mcap", 0, 0, f"{there} are lost"),
         Damage(folder / "w_3.mcap", 0, 0, f"{there} and those up to w_6.mcap are lost"),
@@ -273,7 +273,7 @@ def test_a_file_beside_its_compressed_form_is_read_once(tmp_path):
     put(tmp_path / "a.mcap", tmp_path / "a.mcap.zstd", tmp_path / "b.mcap.zst", tmp_path / "b.mcap.lz4")
     sources = sources_of([tmp_path])
     assert [source.name for source in sources] == ["a.mcap", "b.mcap.lz4"]
-    note = f"{tmp_path.name}: left out as other forms of files that are there: a.mcap.zstd, b.mcap.zst"
+    note = f"{tmp_path.name}: left out as compressed copies of other files: a.mcap.zstd, b.mcap.zst"
     assert sources[0].notes == (note,)
 
 
@@ -343,7 +343,7 @@ def test_patterns_stand_for_what_they_match(tmp_path, monkeypatch):
     assert sources[0].notes == ("run*: 1 other files match and are left out: run.txt",)
     assert names_of(sources_of(["*.txt"])) == [("run.txt", ["run.txt"])]
     with pytest.raises(
-        LogError, match=r"\*\.bag: expected a pattern that matches recordings, found that it matches no"
+        LogError, match=r"\*\.bag: expected a pattern that matches recordings, found one that matches no"
     ):
         sources_of(["*.bag"])
 
@@ -357,7 +357,7 @@ def test_double_stars_go_into_folders(tmp_path, monkeypatch):
         assert names_of(sources) == [("w", ["w_0.mcap", "w_1.mcap"]), ("x.mcap", ["x.mcap"])], pattern
         assert all(source.notes == () for source in sources)
     assert [source.name for source in sources_of(["**/*.mcap"])] == ["w_0.mcap", "w_1.mcap", "x.mcap"]
-    with pytest.raises(LogError, match=r"found that it matches folders without any \(p3\); check it"):
+    with pytest.raises(LogError, match=r"found one that matches folders without any \(p3\); check it"):
         sources_of(["data/*3"])
 
 

@@ -99,7 +99,7 @@ def test_a_recording_of_nav2(pick):
     assert found["tf"].reason == "the only one that fits"
     problem = found["people"].problem
     assert problem.startswith("no people: expected a topic of type people_msgs/People or spencer_tracking_msgs/")
-    assert problem.endswith("say where they stand with `person` x,y")
+    assert problem.endswith("give their places with `person` x,y")
 
 
 @pytest.mark.parametrize(

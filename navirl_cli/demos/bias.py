@@ -1,4 +1,4 @@
-"""What a force sensor shows while nobody pushes: its bias, which drifts as it warms up and steps when it is loaded."""
+"""The bias of a force sensor: its output without a push, which drifts with temperature and steps with a new load."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,15 +8,15 @@ from navirl_cli.demos.smoothing import smoothing_spline
 
 #: Length of the stretches whose steadiness is judged, s.
 STRETCH_S = 0.25
-#: Steady stretches are gathered into bins of this length, s; with fewer bins the bias is one constant.
+#: Length of the bins of steady stretches, s; with fewer bins than this the bias is one constant.
 BIN_S = 2.0
 FEWEST_BINS = 30
-#: Prices of a change of the bias, as a multiple of the force at which a contact begins: so much a minute is free, each
-#: further such force costs so many seconds, and no change costs more than so many.
-FREE_PER_MIN, PRICE_S, MOST_PRICE_S = 0.5, 20.0, 60.0
-#: A change that exceeds what is free by this much, in the same measure, is a step.
+#: Costs of a change of the bias, measured in forces at which a contact begins: the change per minute without cost, the
+#: cost of each further such force in s, and the largest cost of a change in s.
+FREE_PER_MIN, COST_S, MOST_COST_S = 0.5, 20.0, 60.0
+#: A change that exceeds the free one by this much, in the same measure, is a step.
 STEP = 0.5
-#: So many bins may lie between two that show the bias.
+#: Most bins between two that show the bias.
 LOOK_BACK = 300
 #: Changes of the bias within this time are smoothed, s; fewer bins between two steps hold one constant.
 BEND_S, _FEWEST = 10.0, 5
@@ -25,17 +25,17 @@ BEND_S, _FEWEST = 10.0, 5
 def bias_of(t_s: FloatArray, force_n: FloatArray, begins_n: float) -> tuple[FloatArray, NDArray[np.bool_]]:
     """The sensor's bias as a function of time.
 
-    Where the force is steady the sensor shows its bias, or a steady push. They tell by how they change: the bias
-    creeps, and steps rarely and for good; a push comes and goes. So of all chains of steady bins in order of time the
-    one is taken that holds the most time less the price of its changes. With contacts from 3 N on, 1.5 N a minute are
-    free, and what goes beyond costs 20 s for every 3 N, 60 s at most: a push, whose force changes twice, is left out
-    unless it lasts for minutes, a load put on the robot is followed if it stays. A smoothing spline through the chain
-    is the bias, one from each step to the next. Where less than a minute is steady, it is :func:`quiet_bias`.
+    Where the force is steady the sensor shows its bias, or a steady push. The two differ in how they change: the bias
+    drifts, and steps rarely and lastingly; a push begins and ends. Among all chains of steady bins in order of time the
+    one with the largest duration - cost of changes is taken. With contacts from 3 N on, 1.5 N a minute are free, and
+    each further 3 N cost 20 s, at most 60 s a change. So a push, whose force changes twice, is left out unless it lasts
+    for minutes; a load put on the robot is followed if it stays. The bias is a smoothing spline through the chain, a
+    separate one after each step. Where less than a minute is steady, it is :func:`quiet_bias`.
 
     Args:
         t_s: (n,) s, increasing.
         force_n: (n, 3) N, sensor frame.
-        begins_n: Force at which a contact begins, N: a change that is small beside it does no harm.
+        begins_n: Force at which a contact begins, N; much smaller changes do no harm.
 
     Returns:
         (n, 3) bias in N, and (n,) samples of quiet stretches that show it.
@@ -43,7 +43,7 @@ def bias_of(t_s: FloatArray, force_n: FloatArray, begins_n: float) -> tuple[Floa
     rate = 1 / float(np.median(np.diff(t_s)))
     means, spread, length = _stretches(force_n, rate)
     middle = t_s[: len(means) * length].reshape(len(means), length).mean(axis=1)
-    # Not only the quiet ones: while a robot drives, its sensor shakes more than at rest, about the same bias.
+    # not only the quiet stretches: on a moving robot the force varies more, around the same bias
     steady = spread <= 2 * np.median(spread) + 1e-12
     at, level = _binned(middle[steady], means[steady])
     if len(at) < FEWEST_BINS:
@@ -58,10 +58,10 @@ def bias_of(t_s: FloatArray, force_n: FloatArray, begins_n: float) -> tuple[Floa
 
 
 def quiet_bias(force_n: FloatArray, rate_hz: float) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """The sensor's bias, taken for constant, from the stretches in which nobody pushes.
+    """The sensor's bias as one constant, from the stretches without a push.
 
-    A stretch is quiet when it varies hardly more than the quietest tenth of all. A steady push varies little too, but
-    most quiet stretches are free of contact, so that their median is, and stretches far from it are left out.
+    A stretch is quiet when it varies hardly more than the quietest tenth of all. A steady push varies little too. But
+    most quiet stretches are free of contact, and so is their median; stretches far from it are left out.
 
     Args:
         force_n: (n, 3) N, sensor frame.
@@ -113,23 +113,23 @@ def _binned(t_s: FloatArray, force_n: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def _beyond(seconds: FloatArray, change_n: FloatArray, begins_n: float) -> FloatArray:
-    """(k,) by how much changes of the bias, (k, 3) in N within times, (k,), exceed what is free, in ``begins_n``."""
+    """(k,) by how much changes of the bias, (k, 3) N within (k,) s, exceed the free change, in ``begins_n``."""
     size = np.sqrt((change_n**2).sum(axis=1)) / begins_n
     beyond: FloatArray = np.maximum(size - FREE_PER_MIN * seconds / 60, 0)
     return beyond
 
 
 def _chain(at_s: FloatArray, level_n: FloatArray, begins_n: float) -> IntArray:
-    """Numbers of the bins on the chain that holds the most time less the price of its changes.
+    """Numbers of the bins on the chain with the largest duration - cost of changes.
 
-    Dynamic programming over the last bin of a chain: ``score`` is what the best chain up to each bin is worth, s.
+    Dynamic programming over the last bin of a chain: ``score`` is the value of the best chain up to each bin, s.
     """
     score = np.full(len(at_s), BIN_S)
     before = np.full(len(at_s), -1)
     for i in range(1, len(at_s)):
         past = slice(max(0, i - LOOK_BACK), i)
         beyond = _beyond(at_s[i] - at_s[past], level_n[i] - level_n[past], begins_n)
-        reached = score[past] - np.minimum(PRICE_S * beyond, MOST_PRICE_S)
+        reached = score[past] - np.minimum(COST_S * beyond, MOST_COST_S)
         best = int(reached.argmax())
         if reached[best] > 0:
             score[i] += reached[best]
@@ -143,8 +143,7 @@ def _chain(at_s: FloatArray, level_n: FloatArray, begins_n: float) -> IntArray:
 def _smooth(at_s: FloatArray, level_n: FloatArray, steps: IntArray) -> FloatArray:
     """(k, 3) the bias at the bins of a chain, smoothed from each step to the next.
 
-    The spline minimises the sum of squares plus BEND_S^4 / BIN_S times the integral of its squared second derivative;
-    it ends straight, so that it follows a steady drift up to its ends.
+    The spline's penalty is BEND_S^4 / BIN_S. It ends straight, and so follows a steady drift up to its ends.
     """
     parts = []
     for part in np.split(np.arange(len(at_s)), steps + 1):
@@ -159,7 +158,7 @@ def _smooth(at_s: FloatArray, level_n: FloatArray, steps: IntArray) -> FloatArra
 def _with_steps(
     at_s: FloatArray, level_n: FloatArray, steps: IntArray, middle_s: FloatArray, means_n: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The bias with each step at the time that parts best the stretches like before it from those like after it."""
+    """The bias with each step at the time that best separates the stretches before it from those after it."""
     for step in steps[::-1]:
         old, new = level_n[step], level_n[step + 1]
         inside = np.flatnonzero((middle_s > at_s[step]) & (middle_s < at_s[step + 1]))

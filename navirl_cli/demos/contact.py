@@ -1,4 +1,4 @@
-"""When and how the person pushes: bias, low-pass, map frame and contact intervals of a wrench."""
+"""When and how the person pushes: bias, low-pass filter, map frame and contact intervals of a wrench."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,16 @@ from navirl_cli.demos.smoothing import low_passed
 from navirl_cli.errors import LogError
 from navirl_cli.logs.recording import Recording
 
-#: A hand on a robot moves its force below about 5 Hz; gear and wheel noise lie above.
+#: The force of a hand changes below about 5 Hz; noise of gears and wheels lies above.
 CUTOFF_HZ = 5.0
-#: Contacts that break off for less than this are one, s; shorter ones are bumps.
+#: Contacts with a shorter pause between them are one, s; shorter contacts are bumps, s.
 MIN_GAP_S = 0.15
 MIN_CONTACT_S = 0.08
 
 
 @dataclass(frozen=True)
 class PushSettings:
-    """How a force counts as a push."""
+    """Which forces count as a push."""
 
     #: Horizontal force above which a contact begins, N; it ends below half of it.
     begins_n: float = 3.0
@@ -51,11 +51,11 @@ class Pushes:
 def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     """Find the person's pushes in a recording.
 
-    The bias (offset of the bridge, and the handle's weight while the robot stays level) changes slowly in the sensor's
-    frame, so that it is removed there; then the force is turned through the base frame into the map frame. Of a sensor
-    that moves on the robot the handle's weight is no constant in its own frame: what of it turns with the sensor is
-    taken for a push, unless the sensor moves slowly. Where the sensor sits does not matter: a force is the same at any
-    point of a rigid body, and the torque, to which the lever arm adds, is not used.
+    The bias is the offset of the bridge, and the handle's weight while the robot stays level. It changes slowly in the
+    sensor's frame and is removed there. Then the force is rotated through the base frame into the map frame. If the
+    sensor moves on the robot, the handle's weight is not constant in the sensor's frame: the part that rotates with the
+    sensor counts as a push, unless the sensor moves slowly. The sensor's place does not matter: a force is the same at
+    any point of a rigid body, and the torque, which depends on the lever arm, is not used.
 
     Raises:
         LogError: The recording holds too few wrench messages.
@@ -77,7 +77,7 @@ def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     cos, sin = np.cos(yaw), np.sin(yaw)
     force = np.stack([cos * smooth[:, 0] - sin * smooth[:, 1], sin * smooth[:, 0] + cos * smooth[:, 1]], axis=1)
     size = np.hypot(*force.T)
-    # The median of a Rayleigh distribution: a push beside a quiet stretch leaks into it through the filter.
+    # by the median of a Rayleigh distribution: a push beside a quiet stretch leaks into it through the filter
     noise = float(np.median(size[quiet]) / np.sqrt(2 * np.log(2)))
     spans = hysteresis(size, settings.begins_n, settings.begins_n / 2)
     return Pushes(wrench.t_ns, force, base, _tidy(spans, wrench.t_ns), noise)
@@ -88,8 +88,8 @@ def hysteresis(size: FloatArray, high: float, low: float) -> IntArray:
 
     Args:
         size: (n,) values.
-        high: What a stretch must exceed once.
-        low: What it stays above.
+        high: A stretch must exceed this once.
+        low: It stays above this.
 
     Returns:
         (c, 2) first and last sample of every stretch.
@@ -133,13 +133,13 @@ def contacts_within(pushes: Pushes, start_ns: int, stop_ns: int) -> tuple[Contac
 
 
 def missing_s(pushes: Pushes, start_ns: int, stop_ns: int) -> float:
-    """Longest time within a trial for which there is no force, s."""
+    """Longest time within a trial without a force, s."""
     inside = pushes.t_ns[(pushes.t_ns > start_ns) & (pushes.t_ns < stop_ns)]
     return float(np.diff(np.concatenate([[start_ns], inside, [stop_ns]])).max() / 1e9)
 
 
 def _tidy(spans: IntArray, t_ns: IntArray) -> IntArray:
-    """Join contacts that break off for a moment, then drop bumps."""
+    """Join contacts with a short pause between them, then drop bumps."""
     joined: list[list[int]] = []
     for first, last in spans.tolist():
         if joined and t_ns[first] - t_ns[joined[-1][1]] < MIN_GAP_S * 1e9:

@@ -11,12 +11,12 @@ from navirl_cli.errors import DemonstrationError
 
 
 class Condition(StrEnum):
-    """What steered the robot beside its own navigation."""
+    """Who steered the robot besides its own navigation, and how."""
 
     FORCE = "force"
     JOYSTICK = "joystick"
     AUTONOMOUS = "autonomous"
-    #: The log does not say, and holds no wrench that would tell.
+    #: The log does not name the condition, and holds no wrench to find it from.
     UNKNOWN = "unknown"
 
 
@@ -48,7 +48,7 @@ class PersonTrack(ByContent):
     """Where one person was during a trial."""
 
     name: str
-    #: (k,) s since the trial's start, increasing; empty of a person who stands still.
+    #: (k,) s since the trial's start, increasing; empty for a person who stands still.
     t_s: FloatArray
     #: (k, 2) m, map frame.
     xy_m: FloatArray
@@ -68,9 +68,9 @@ class PersonTrack(ByContent):
         """(2,) mean place over the time from first to last sight, on straight lines between sights, m.
 
         Raises:
-            IndexError: The track is empty; the place of who stands still is in people_m.
+            IndexError: The track is empty; the place of a person who stands still is in people_m.
         """
-        # From the first place on, so that who stands still has just that as the mean, to the last digit.
+        # relative to the first place: the mean of a person who stands still is that place, to the last digit
         from_first = self.xy_m - self.xy_m[0]
         if len(self.t_s) > 1:
             from_first = np.trapezoid(from_first, self.t_s[:, None], axis=0)[None] / (self.t_s[-1] - self.t_s[0])
@@ -79,22 +79,22 @@ class PersonTrack(ByContent):
 
     @property
     def spread_m(self) -> float:
-        """Largest distance from the mean place, m; 0 of a person who stands still."""
+        """Largest distance from the mean place, m; 0 for a person who stands still."""
         return float(np.hypot(*(self.xy_m - self.mean_m).T).max()) if len(self.t_s) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Demonstration(ByContent):
-    """A trial: the path that was driven, the forces on the way, and the scene around it."""
+    """A trial: the path that was driven, the forces along it, and the scene around it."""
 
     #: Name, unique within a file of demonstrations: participant, slash, number of the trial.
     id: str
     participant: str
     condition: Condition
-    #: True where the person intervened (pushed, or moved the joystick), so that the path shows their wish; None where
-    #: nobody knows.
+    #: Whether the person intervened (pushed, or moved the joystick), so that the path shows their preference; None
+    #: where unknown.
     corrected: bool | None
-    #: Number of the interaction cycle (Sec. IV-C), or None where the log does not say.
+    #: Number of the interaction cycle (Sec. IV-C), or None where the log has none.
     cycle: int | None
     #: Log time of the trial's start, ns since the epoch of the log's clock.
     start_ns: int
@@ -106,11 +106,11 @@ class Demonstration(ByContent):
     yaw_rad: FloatArray
     #: (n, 2) N, map frame, bias removed and low-passed; None where the log holds no wrench.
     force_n: FloatArray | None
-    #: None where contact is unknown, for want of a wrench.
+    #: None where contact is unknown, because forces were not read.
     contacts: tuple[Contact, ...] | None
     #: The announced goal, m, map frame.
     goal_m: tuple[float, float]
-    #: (p, 2) m, map frame: where the people stand; the mean over the trial of one who moves.
+    #: (p, 2) m, map frame: the places of the people; for a person who moves the mean over the trial.
     people_m: FloatArray
     #: Radius of the robot, m.
     robot_radius_m: float
@@ -120,20 +120,20 @@ class Demonstration(ByContent):
     cells: IntArray
     #: File name of the log.
     log: str = ""
-    #: How the people moved, one track for each of people_m in the same order; none at all where nobody did.
+    #: How the people moved, one track for each of people_m in the same order; empty where all stood still.
     tracks: tuple[PersonTrack, ...] = ()
-    #: What the trial was for, where it is not the session's main task: "obstacle course", say.
+    #: Purpose of the trial, such as "obstacle course"; None for the session's main task.
     set: str | None = None
-    #: (k, 2) m, map frame: the line that the robot's navigation followed, where the log says; else the scene's nominal
-    #: path stands for it.
+    #: (k, 2) m, map frame: the line that the robot's navigation followed, from the log; None for the scene's nominal
+    #: path.
     nominal_m: FloatArray | None = None
     #: Speed at which positions without times were laid out, m/s; None where t_s was measured.
     laid_out_m_s: float | None = None
-    #: What a reader of the results should know of this trial.
+    #: What a reader of the results should know about this trial.
     notes: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Check shapes, order and that the path fits the grid."""
+        """Check shapes, order, and that the path fits the grid."""
         n = len(self.t_s)
         for name, value, shape in (
             ("t_s", self.t_s, (n,)),

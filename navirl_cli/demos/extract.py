@@ -15,6 +15,7 @@ from navirl_cli.demos.checks import (
     check_start,
     check_travel,
     jump_notes,
+    path_notes,
     people_notes,
     recording_notes,
 )
@@ -33,24 +34,24 @@ Entry = TypeVar("Entry", Declared, Published)
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
 STICK_DEAD_ZONE = 0.1
 STEERED_S = 0.3
-#: Of a robot that nobody says anything about, m.
+#: The robot's radius where neither user nor log gives one, m.
 ROBOT_RADIUS_M = 0.3
 
 
 @dataclass(frozen=True)
 class ExtractSettings:
-    """What a user can say about the extraction."""
+    """The user's choices about the extraction."""
 
     split: Split = Split.GOAL
     resolution_m: float = 0.1
-    #: None: what the log's session record says, else ROBOT_RADIUS_M.
+    #: None: that of the log's session record, else ROBOT_RADIUS_M.
     robot_radius_m: float | None = None
     rasterizer: Rule = Rule.STUDY
     push: PushSettings = field(default_factory=PushSettings)
     participant: str | None = None
     #: (x, y) m, map frame, each: in place of the log's people.
     people_m: tuple[tuple[float, float], ...] | None = None
-    #: In place of the log's goals; a log that announces none has it from its start.
+    #: In place of the log's goals; in a log without goals from its start on.
     goal_m: tuple[float, float] | None = None
     #: Whether to estimate how fast the robot gives way to a push.
     gain: bool = False
@@ -58,43 +59,43 @@ class ExtractSettings:
 
 @dataclass(frozen=True, eq=False)
 class Extraction(ByContent):
-    """What came out of one recording."""
+    """The demonstrations of one recording, and what was found about it."""
 
     #: Name of the log.
     log: str
     demonstrations: tuple[Demonstration, ...]
     #: Trials found, those that were skipped included.
     trials: int
-    #: What was skipped, and why.
+    #: The trials that were skipped, and why.
     skipped: tuple[str, ...]
-    #: What of the log could not be read.
+    #: Damage of the log.
     damage: tuple[str, ...]
-    #: What is odd about the recording; notes on a trial stand in its demonstration.
+    #: What is unusual about the recording; notes on a trial are in its demonstration.
     notes: tuple[str, ...]
-    #: How fast the robot gives way to a push; None where nobody asked, or nobody pushed.
+    #: How fast the robot gives way to a push; None where it was not requested, or no push allows an estimate.
     gain: Gain | None = None
-    #: Names of the paths whose cells were published with the log, and whether ours are the same.
+    #: Names of the paths whose cells were published with the log, and whether our cells are equal.
     published: Mapping[str, bool] = field(default_factory=dict)
-    #: Times in which a course was completed, s, by modality, as the log's session record says.
+    #: Times in which a course was completed, s, by modality, from the log's session record.
     completion_s: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
 def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     """Turn one recording into demonstrations.
 
-    A trial that cannot become a demonstration is skipped with the reason; the others stand.
+    A trial that cannot become a demonstration is skipped with the reason.
 
     Args:
-        recording: A log's content in one frame.
+        recording: A log's content in one frame and on one clock.
         settings: The user's choices.
 
     Returns:
         Demonstrations with ids ``participant/number``.
 
     Raises:
-        NavirlError: Nothing in the recording is usable.
+        NavirlError: No trial of the recording is usable.
     """
-    recording = _with_said(recording, settings)
+    recording = _with_goal(recording, settings)
     occupancy, radius_m = recording.occupancy, _radius_m(recording, settings)
     grid = grid_from_occupancy(occupancy.data, occupancy.resolution_m, occupancy.origin_m, radius_m).resampled(
         settings.resolution_m
@@ -117,7 +118,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
-        notes.append(f"{recording.log}: no trial holds a push to the side, so that its gain is unknown")
+        notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
     return Extraction(
         log=recording.log,
         demonstrations=tuple(found),
@@ -132,9 +133,9 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
 
 
 def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
-    """Demonstrations of several recordings with unique ids: a participant's trials are counted through.
+    """Demonstrations of several recordings with unique ids: a participant's trials are numbered throughout.
 
-    A trial that was skipped keeps its number, so that an id means the same trial whatever the settings.
+    A skipped trial keeps its number, so that an id means the same trial for all settings.
     """
     before: Counter[str] = Counter()
     unique = []
@@ -147,8 +148,8 @@ def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
     return unique
 
 
-def _with_said(recording: Recording, settings: ExtractSettings) -> Recording:
-    """The recording with the goal that the user said in place of its own; without any it is announced at the start."""
+def _with_goal(recording: Recording, settings: ExtractSettings) -> Recording:
+    """The recording with the user's goal in place of its own; in one without goals it is announced at the start."""
     if settings.goal_m is None:
         return recording
     times = recording.goal_t_ns if len(recording.goal_t_ns) else recording.t_ns[:1]
@@ -156,7 +157,7 @@ def _with_said(recording: Recording, settings: ExtractSettings) -> Recording:
 
 
 def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
-    """One line a reason."""
+    """One line for each reason."""
     by_reason: dict[str, list[str]] = {}
     for number, reason in skipped:
         by_reason.setdefault(reason, []).append(str(number))
@@ -184,12 +185,12 @@ def _demonstration(
         check_goal(free, xy[0], goal)
     declared = _nearest(recording.session.declared, start_ns, stop_ns) or Declared(start_ns)
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
-    seen, corrected = _seen(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
-    notes = [*_path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
+    observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
+    notes = [*path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
-        condition=seen if declared.condition is None else _condition(declared.condition),
+        condition=observed if declared.condition is None else _condition(declared.condition),
         corrected=corrected,
         cycle=declared.cycle,
         start_ns=start_ns,
@@ -220,26 +221,15 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
     return cells, free
 
 
-def _path_notes(trial: Trial, cells: IntArray, grid: Grid, from_goal_m: FloatArray) -> list[str]:
-    """What is odd about where a trial led; it ended (2,) m away from its goal."""
-    notes = []
-    if not trial.arrived:
-        notes.append(f"ended {np.hypot(*from_goal_m):.2f} m from its goal; its last cell stands for the goal")
-    blocked = int(grid.is_occupied(np.unique(cells, axis=0)).sum())
-    if blocked:
-        notes.append(f"{blocked} driven cells that the map calls occupied were freed")
-    return notes
-
-
 def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> People:
-    """The people of a trial: those whom the user placed, else those of the log."""
+    """The people of a trial: those placed by the user, else those of the log."""
     if settings.people_m is not None:
         return People(np.array(settings.people_m))
     return people_during(recording, start_ns, stop_ns)
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:
-    """Time with the joystick deflected, s; a command holds until the next one, half a second at most."""
+    """Time with the joystick deflected, s; a command holds until the next one, for half a second at most."""
     first, stop = np.searchsorted(recording.command_t_ns, [start_ns, stop_ns])
     if stop - first < 2:
         return 0.0
@@ -248,13 +238,13 @@ def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:
 
 
 def _radius_m(recording: Recording, settings: ExtractSettings) -> float:
-    """The robot's radius as the user says, else as the log does, m."""
-    said = (settings.robot_radius_m, recording.session.robot_radius_m, ROBOT_RADIUS_M)
-    return next(radius for radius in said if radius is not None)
+    """The robot's radius from the user, else from the log, m."""
+    radii = (settings.robot_radius_m, recording.session.robot_radius_m, ROBOT_RADIUS_M)
+    return next(radius for radius in radii if radius is not None)
 
 
 def _published(recording: Recording, found: Iterable[Demonstration]) -> dict[str, bool]:
-    """Whether cells are as published, by the published path's name; one without a demonstration is not."""
+    """Whether cells are as published, by the published path's name; False without a demonstration."""
     known = recording.session.published
     same = dict.fromkeys((entry.name for entry in known), False)
     for one in found:
@@ -265,14 +255,14 @@ def _published(recording: Recording, found: Iterable[Demonstration]) -> dict[str
 
 
 def _nearest(entries: Sequence[Entry], start_ns: int, stop_ns: int) -> Entry | None:
-    """What a metadata record says of the trial: the entry whose time lies nearest to the trial's start."""
+    """The entry of a metadata record for a trial: the one whose time is nearest to the trial's start."""
     nearest = min(entries, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
-    # An entry far from the start belongs to another trial.
+    # an entry far from the start belongs to another trial
     return nearest if nearest is not None and abs(nearest.t_ns - start_ns) < (stop_ns - start_ns) else None
 
 
-def _seen(contacts: Sequence[Contact] | None, *, steered: bool) -> tuple[Condition, bool | None]:
-    """The condition that joystick and wrench show, and whether the person intervened."""
+def _observed(contacts: Sequence[Contact] | None, *, steered: bool) -> tuple[Condition, bool | None]:
+    """The condition by joystick and wrench, and whether the person intervened."""
     if steered:
         return Condition.JOYSTICK, True
     if contacts is None:
@@ -286,4 +276,6 @@ def _condition(name: str) -> Condition:
         return Condition(name)
     except ValueError:
         known = ", ".join(Condition)
-        raise DemonstrationError(f"unknown condition {name!r} in the log's session record; known are {known}") from None
+        raise DemonstrationError(
+            f"the log's session record: expected a condition ({known}), found {name!r}; correct it"
+        ) from None

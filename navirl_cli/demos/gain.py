@@ -11,15 +11,15 @@ from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.smoothing import lagged
 from navirl_cli.logs.recording import Recording
 
-#: Everything is put on a clock of this step, s; every so many steps are a sample.
+#: Step of the common clock, s, and steps from one sample to the next.
 STEP_S, STRIDE = 0.01, 5
-#: Means over two neighbouring windows of this length are compared, s; longer where poses are rare.
+#: Length of the two neighbouring windows whose means are compared, s; longer where poses are rare.
 WINDOW_S = 0.25
-#: Samples are taken from so long before a push to so long after it, and cut into pieces of about this length, s.
+#: Samples begin this long before a push and end this long after it, and are cut into pieces of about this length, s.
 MARGIN_S, PIECE_S = 1.0, 2.5
 #: Residuals farther apart than this are taken to be independent, s.
 MEMORY_S = 2.0
-#: What is tried for the robot's answer to a push: dead time, and time constant of a first-order lag, s.
+#: Candidates for the robot's response to a push: dead time, and time constant of a first-order lag, s.
 DELAYS_S = np.arange(0, 0.41, 0.02)
 LAGS_S = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 
@@ -38,7 +38,7 @@ class Gain:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Moments around pushes at which changes of velocity and force are compared."""
+    """Times around pushes at which changes of velocity and force are compared."""
 
     #: (n,) steps of the clock.
     at: IntArray
@@ -56,13 +56,13 @@ def gain_of(
 ) -> Gain | None:
     """Estimate the gain from the sideways velocity and the sideways force in the robot's base frame.
 
-    The navigation's own velocity v_nav is unknown, but slow beside a push. So changes are compared, not values: by how
-    much the mean velocity over a quarter of a second differs from that over the quarter before, against the same of the
-    force. Both are filtered alike by that, and what tells is where a push rises or falls. What of v_nav changes with
-    the push, as the navigation pulls back to its path, is taken for proportional to how far the robot has moved aside,
-    by a factor of its own in every 2.5 s. A robot that answers late would seem to give way less: dead time and
-    first-order lag of the answer are those of a grid that explain the most. The gain is in the odometry's metres, where
-    it gives velocities.
+    The navigation's own velocity v_nav is unknown, but changes slowly beside a push. So changes are compared:
+    the mean velocity over a quarter of a second - that over the quarter before, against the same difference of the
+    force. This filters both alike, and the information is where a push rises or falls. The part of v_nav that changes
+    with the push, as the navigation pulls back to its path, is taken to be proportional to the robot's movement aside,
+    with a separate factor every 2.5 s. A late response would bias the gain towards 0. So dead time and first-order lag
+    of the response are those values of a grid that explain the most. The gain is in the odometry's metres, where the
+    odometry gives velocities.
 
     The standard error is that of nonlinear least squares, robust against unequal variances and against correlation over
     2 s (W. Newey and K. West, Econometrica 55 (1987), 703-708, weights 1 - j/(m + 1)).
@@ -75,7 +75,7 @@ def gain_of(
             does not count.
 
     Returns:
-        The gain, or None where nobody pushes to the side.
+        The gain, or None without a push to the side.
     """
     start_ns = int(recording.t_ns[0])
     t_s, force_t_s = (recording.t_ns - start_ns) / 1e9, (pushes.t_ns - start_ns) / 1e9
@@ -84,17 +84,17 @@ def gain_of(
         return None
     clock = np.arange(samples.at[-1] + samples.window + 1) * STEP_S
     moved = np.interp(clock, t_s, _sideways_m(recording, t_s))
-    # The force too as the poses' times see it, so that rare poses smooth both alike.
+    # the force at the poses' times too, so that rare poses smooth both alike
     given = np.interp(t_s, force_t_s, _integral(force_t_s, pushes.base_n[:, 1]))
     impulse = np.interp(clock, t_s, given)
     aside = _changes(np.cumsum(moved) * STEP_S, samples.at, samples.window)
     velocity = _without(_changes(moved, samples.at, samples.window), aside, samples.piece)
 
-    def answer(late: FloatArray, delay_s: float) -> FloatArray:
+    def response(late: FloatArray, delay_s: float) -> FloatArray:
         changes = _changes(late, samples.at - round(delay_s / STEP_S), samples.window)
         return _without(changes, aside, samples.piece)
 
-    return _fitted(velocity, impulse, answer, samples)
+    return _fitted(velocity, impulse, response, samples)
 
 
 def pooled(gains: Sequence[Gain]) -> Gain:
@@ -110,7 +110,7 @@ def pooled(gains: Sequence[Gain]) -> Gain:
 
 
 def _sideways_m(recording: Recording, t_s: FloatArray) -> FloatArray:
-    """(n,) how far the robot has moved to its left, as it stood at each time, since the first pose, m."""
+    """(n,) movement of the robot to its left, in its own frame at each time, since the first pose, m."""
     if recording.velocity_m_s is not None:
         return _integral(t_s, recording.velocity_m_s[:, 1])
     yaw = np.unwrap(recording.yaw_rad)
@@ -127,11 +127,11 @@ def _integral(t_s: FloatArray, values: FloatArray) -> FloatArray:
 def _samples(
     recording: Recording, pushes: Pushes, demonstrations: Iterable[Demonstration], begins_n: float
 ) -> _Samples | None:
-    """The moments around the pushes of all trials, or None where there are none."""
+    """The times around the pushes of all trials, or None without pushes."""
     start_ns = int(recording.t_ns[0])
     rarest = float(np.median(np.diff(recording.t_ns))) / 1e9
     window = round(max(WINDOW_S, 2 * rarest) / STEP_S)
-    # Where the localisation leaps the poses tell no velocity.
+    # across a jump of the localisation the poses give no velocity
     leaps = [(jump.t_ns - start_ns) / 1e9 for jump in recording.jumps if recording.velocity_m_s is None]
     stretches, pieces, count = [], [], 0
     for one in demonstrations:
@@ -172,45 +172,45 @@ def _sideways_pushes(one: Demonstration, pushes: Pushes, begins_n: float) -> lis
 
 
 def _changes(integral: FloatArray, at: IntArray, window: int) -> FloatArray:
-    """(n,) mean over the window after each step less the mean over that before, of what has this integral."""
+    """(n,) mean over the window after each step - mean over the window before it, of the integral's derivative."""
     before, here, after = (integral[np.maximum(at + shift, 0)] for shift in (-window, 0, window))
     changes: FloatArray = (after - 2 * here + before) / (window * STEP_S)
     return changes
 
 
 def _without(values: FloatArray, aside: FloatArray, piece: IntArray) -> FloatArray:
-    """What of values is not proportional to how far the robot moved aside, piece by piece."""
+    """The part of values that is not proportional to the robot's movement aside, piece by piece."""
     square = np.bincount(piece, aside**2)
     factor = np.divide(np.bincount(piece, values * aside), square, out=np.zeros_like(square), where=square > 0)
     return values - factor[piece] * aside
 
 
 def _late(integral: FloatArray, lag_s: float) -> FloatArray:
-    """What has this integral after a first-order lag, as an integral again."""
+    """The integral of a signal after a first-order lag, from the signal's integral."""
     return lagged(integral, float(np.exp(-STEP_S / lag_s))) if lag_s else integral
 
 
 def _fitted(
-    velocity: FloatArray, impulse: FloatArray, answer: Callable[[FloatArray, float], FloatArray], samples: _Samples
+    velocity: FloatArray, impulse: FloatArray, response: Callable[[FloatArray, float], FloatArray], samples: _Samples
 ) -> Gain:
     """The gain with the dead time and the lag that explain the most, and its standard error."""
     best, delay, lag = -1.0, 0.0, 0.0
     for tried in LAGS_S:
         late = _late(impulse, tried)
         for wait in DELAYS_S.tolist():
-            force = answer(late, wait)
+            force = response(late, wait)
             explained = float((force @ velocity) ** 2 / (force @ force))
             if explained > best:
                 best, delay, lag = explained, wait, tried
-    force = answer(_late(impulse, lag), delay)
+    force = response(_late(impulse, lag), delay)
     k = float(force @ velocity / (force @ force))
-    # Delay and lag were estimated too, and cost certainty where they are not at the end of their range.
+    # delay and lag were estimated too, which adds uncertainty where they are not at the end of their range
     slopes = [force]
     if delay > 0:
-        earlier, later = (answer(_late(impulse, lag), delay + change) for change in (-0.02, 0.02))
+        earlier, later = (response(_late(impulse, lag), delay + change) for change in (-0.02, 0.02))
         slopes.append(k * (later - earlier) / 0.04)
     if lag > 0:
-        shorter, longer = (answer(_late(impulse, lag * factor), delay) for factor in (0.9, 1.1))
+        shorter, longer = (response(_late(impulse, lag * factor), delay) for factor in (0.9, 1.1))
         slopes.append(k * (longer - shorter) / (0.2 * lag))
     variance = _covariance(np.stack(slopes, axis=1), velocity - k * force, samples.stretch)[0, 0]
     return Gain(k, float(np.sqrt(variance)), samples.pushes, delay + lag)

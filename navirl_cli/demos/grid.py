@@ -1,4 +1,4 @@
-"""Occupancy on square cells: where they are, which are free, and how a robot's radius grows the obstacles."""
+"""Occupancy grids: where cells are, which are free, and how a robot's radius grows the obstacles."""
 
 from dataclasses import dataclass
 from hashlib import sha256
@@ -23,13 +23,13 @@ TURN_RAD: FloatArray = np.minimum(_APART, 8 - _APART) * (np.pi / 4)
 #: (3, 3) number of the move with the displacement (dx, dy) at [dx + 1, dy + 1]; -1 in the middle.
 _NUMBER: IntArray = np.array([[5, 4, 3], [6, -1, 2], [7, 0, 1]], dtype=np.int64)
 
-#: Cells finer than this have no meaning for a robot, coarser ones no paths, m.
+#: Finer cells mean nothing to a robot, coarser ones hold no paths, m.
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 0.01, 2.0
 #: map_server's default: an occupancy of 65 % and more is an obstacle.
 OCCUPIED_FROM = 65
 #: A costmap marks cells within the robot's inscribed radius 99 and obstacles themselves 100.
 INSCRIBED, LETHAL = 99, 100
-#: Share of the obstacles' cells that are ringed in an inflated costmap; cells seen a moment ago may not be yet.
+#: Share of the obstacles' cells that are ringed in an inflated costmap; cells seen just before may not be yet.
 MOST = 0.9
 
 
@@ -128,7 +128,7 @@ class Grid(ByContent):
             raise GridError(
                 f"{int(outside.sum())} cells of the path lie beyond the map, the first at x {x:.2f} m, y {y:.2f} m; "
                 f"the map spans x {self.extent_m[0]:.2f} to {self.extent_m[1]:.2f} m, "
-                f"y {self.extent_m[2]:.2f} to {self.extent_m[3]:.2f} m: give the map in which the robot drove"
+                f"y {self.extent_m[2]:.2f} to {self.extent_m[3]:.2f} m; give the map in which the robot drove"
             )
         occupied = self.occupied.copy()
         occupied[cells[:, 1], cells[:, 0]] = False
@@ -139,7 +139,7 @@ class Grid(ByContent):
 
         Args:
             radius_m: Cells whose centre is nearer than this to an occupied cell's centre become occupied.
-            around_m: (p, 2) m, map frame: grow these points (people, say) in place of the obstacles' centres.
+            around_m: (p, 2) m, map frame: grow these points, such as people, in place of the obstacles' centres.
 
         Returns:
             A new grid; obstacles remain.
@@ -237,7 +237,7 @@ def grid_from_occupancy(
     """Turn ROS occupancy into a grid for the robot's centre.
 
     An inflated costmap's lethal cells are taken as they are. A plain map's obstacles are grown by the robot's radius.
-    Unknown cells (-1) count as occupied: nobody has shown that a robot can drive there.
+    Unknown cells (-1) count as occupied.
 
     Args:
         data: (rows, columns), -1 unknown, 0..100 per cent, as nav_msgs/OccupancyGrid.

@@ -1,4 +1,4 @@
-"""Lines in the plane: length, and a line without shaking in place."""
+"""Lines in the plane: their length, with fewer points, with more points."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ def path_length_m(line_m: FloatArray) -> float:
 
 
 def thinned(line_m: FloatArray, spacing_m: float) -> FloatArray:
-    """The points of an (n, 2) line at which it got on by a spacing, m: what shakes in place adds no length."""
+    """Points of an (n, 2) line at least a spacing apart, m: noise in place adds no length."""
     kept = [line_m[0]]
     for point in line_m:
         if np.hypot(*(point - kept[-1])) >= spacing_m:
@@ -20,11 +20,11 @@ def thinned(line_m: FloatArray, spacing_m: float) -> FloatArray:
 
 
 def divided(line_m: FloatArray, t_s: FloatArray, longest_m: float) -> tuple[FloatArray, FloatArray]:
-    """A timed line with points so dense that no piece is longer than a length; its own points stay.
+    """A timed line with more points, so that no piece is longer than a given length; its own points stay.
 
     Args:
         line_m: (n, 2) m.
-        t_s: (n,) s, or whatever else runs along the line.
+        t_s: (n,) s, or another quantity along the line.
         longest_m: Longest piece, m.
     """
     length = np.hypot(*np.diff(line_m, axis=0).T)

@@ -1,4 +1,4 @@
-"""Where the people are during a trial: tracks put together, ghosts left out, and the place that stands for each."""
+"""Where the people are during a trial: tracks are joined, false ones left out, and one place represents each person."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import PersonTrack
 from navirl_cli.logs.recording import Recording
 
-#: One who moves less than this stands still, m; beyond the other the mean place tells little of where they were.
+#: A person who moves less than this stands still, m; beyond the second distance the mean place describes them badly.
 STILL_M, WIDE_M = 0.05, 0.3
-#: What is seen in a smaller share of the seconds in which a log tells of people is a ghost of the tracker.
-GHOST = 0.2
-#: A track that begins this near to where another ended goes on with it, m.
+#: A track seen in a smaller share of the seconds with messages about people is false.
+FALSE_SHARE = 0.2
+#: A track that begins this near to where another ended continues it, m.
 NEAR_M = 0.5
-#: Nobody walks faster, m/s: a track that leaps has passed from one person to another.
+#: No person walks faster, m/s: a track that leaps has passed from one person to another.
 FASTEST_M_S = 3.0
 
 
@@ -24,7 +24,7 @@ class People:
 
     #: (p, 2) m, map frame: mean places over the trial.
     people_m: FloatArray
-    #: One for each person, empty of those who stand still; none at all where nobody moves.
+    #: One for each person, empty for those who stand still; no tracks where all stand still.
     tracks: tuple[PersonTrack, ...] = ()
     #: What a reader of the results should know, in words.
     notes: tuple[str, ...] = ()
@@ -32,7 +32,7 @@ class People:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A stretch of a track without leaps."""
+    """A part of a track without leaps."""
 
     name: str
     t_ns: IntArray
@@ -40,11 +40,11 @@ class _Piece:
 
 
 def people_during(recording: Recording, start_ns: int, stop_ns: int) -> People:
-    """The people whom a log's messages place in a trial.
+    """The people of a trial, from a log's messages.
 
-    Trackers lose people and number them anew, and messages without names tell people by their place in a list: tracks
-    are cut where they leap, and put together where one goes on near the place at which another ended before. Where no
-    message falls into the trial the last one before it holds, as a latched topic means it, else the first one after.
+    Trackers lose people and give them new numbers, and messages without names identify people by their place in a list.
+    So tracks are cut where they leap, and joined where one begins near the place at which another ended. Without a
+    message in the trial the last one before it holds, as for latched topics, else the first one after it.
 
     Args:
         recording: Tracks in the map's frame.
@@ -57,14 +57,14 @@ def people_during(recording: Recording, start_ns: int, stop_ns: int) -> People:
     begin, end = (int(recording.people_t_ns[row]) for row in (first, stop - 1))
     pieces = [piece for number, _ in enumerate(recording.people) for piece in _pieces(recording, number, begin, end)]
     everyone = _joined(pieces)
-    told = len(_seconds(recording.people_t_ns[first:stop], begin))
+    reported = len(_seconds(recording.people_t_ns[first:stop], begin))
     seconds = [len(_seconds(np.concatenate([piece.t_ns for piece in person]), begin)) for person in everyone]
-    seen = [person for person, count in zip(everyone, seconds, strict=True) if count >= GHOST * told]
-    ghosts = [person[0].name for person, count in zip(everyone, seconds, strict=True) if count < GHOST * told]
+    seen = [person for person, count in zip(everyone, seconds, strict=True) if count >= FALSE_SHARE * reported]
+    false = [person[0].name for person, count in zip(everyone, seconds, strict=True) if count < FALSE_SHARE * reported]
     tracks = [_track(person, start_ns) for person in seen]
     notes = [note for person, track in zip(seen, tracks, strict=True) for note in _notes(person, track)]
-    if ghosts:
-        notes.append(f"left out, for seen in less than {GHOST:.0%} of the time: person {', '.join(ghosts)}")
+    if false:
+        notes.append(f"left out, because seen in less than {FALSE_SHARE:.0%} of the time: person {', '.join(false)}")
     return People(np.array([track.mean_m for track in tracks]).reshape(-1, 2), _moving(tracks), tuple(notes))
 
 
@@ -75,7 +75,7 @@ def _messages(t_ns: IntArray, start_ns: int, stop_ns: int) -> tuple[int, int]:
 
 
 def _seconds(t_ns: IntArray, since_ns: int) -> IntArray:
-    """The whole seconds, counted from a time, in which times fall."""
+    """The seconds, counted from a time, that contain some of the times."""
     return np.unique((t_ns - since_ns) // 1_000_000_000)
 
 
@@ -91,7 +91,7 @@ def _pieces(recording: Recording, number: int, begin_ns: int, end_ns: int) -> li
 
 
 def _joined(pieces: list[_Piece]) -> list[list[_Piece]]:
-    """Pieces by person: each goes on with the nearest that ended before it began, if that is near."""
+    """Pieces by person: each continues the nearest one that ended before it began, if that is near."""
     everyone: list[list[_Piece]] = []
     for piece in sorted(pieces, key=lambda piece: int(piece.t_ns[0])):
         ended = [person for person in everyone if person[-1].t_ns[-1] < piece.t_ns[0]]
@@ -110,7 +110,7 @@ def _track(person: list[_Piece], start_ns: int) -> PersonTrack:
 
 
 def _moving(tracks: list[PersonTrack]) -> tuple[PersonTrack, ...]:
-    """The tracks without those of people who stand still; none where all do."""
+    """The tracks, emptied for people who stand still; none where all do."""
     still = [track.spread_m < STILL_M for track in tracks]
     if all(still):
         return ()
@@ -121,12 +121,12 @@ def _moving(tracks: list[PersonTrack]) -> tuple[PersonTrack, ...]:
 
 
 def _notes(person: list[_Piece], track: PersonTrack) -> list[str]:
-    """What is odd about one person."""
+    """What is unusual about one person."""
     names = list(dict.fromkeys(piece.name for piece in person))
-    notes = [f"person {names[0]} goes on as {', '.join(names[1:])}: taken for one"] if len(names) > 1 else []
+    notes = [f"person {names[0]} continues as {', '.join(names[1:])}: taken as one person"] if len(names) > 1 else []
     if track.spread_m > WIDE_M:
         notes.append(
             f"person {track.name} moves: up to {track.spread_m:.2f} m from the mean place over the trial, "
-            "which stands for them in the scene"
+            "which represents them in the scene"
         )
     return notes

@@ -1,4 +1,4 @@
-"""From a driven path to cells, by the study's rule or by what the line crosses.
+"""From a driven path to cells, by the study's rule or by the cells that the line crosses.
 
 The study's rule (it reproduces the published paths cell for cell): start in the first pose's cell; of the eight
 neighbours, but never back into the cell before the present one, step to the one whose centre is nearest to the
@@ -19,20 +19,20 @@ from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.grid import MOVES, Grid
 from navirl_cli.errors import DemonstrationError
 
-#: No path needs more steps than this many per cell that its line passes; a rule that still walks has lost the path.
+#: Most steps per cell that the line passes; a rule that needs more has lost the path.
 PATIENCE = 4
 
 
 class Rule(StrEnum):
-    """How a line becomes cells; on a straight line all agree but for corners."""
+    """How a line becomes cells; on a straight line all rules agree except at corners."""
 
-    #: From cell to cell, to the neighbour whose centre is nearest to the rest of the line. Leaves loops out.
+    #: From cell to cell, to the neighbour whose centre is nearest to the remaining line. Leaves loops out.
     STUDY = "study"
-    #: Every cell that the line crosses, but those that an 8-connected path does not need, shortest stay first: it cuts
-    #: every corner.
+    #: The cells that the line crosses, without those that an 8-connected path does not need: those with the shortest
+    #: stay are left out first. Cuts every corner.
     CROSSED = "crossed"
     #: The centres nearest to the line's crossings with the lines through centres (Freeman's chain code), never straight
-    #: back. Keeps corners that the line passes near their centre.
+    #: back. Keeps corners whose centre is near the line.
     CHAIN = "chain"
 
 
@@ -41,7 +41,7 @@ def rasterize(xy_m: FloatArray, grid: Grid, rule: Rule = Rule.STUDY) -> IntArray
 
     Args:
         xy_m: (n, 2) m, map frame, in the order in which they were driven.
-        grid: Gives the cells; what is occupied does not matter here.
+        grid: Gives the cells; occupancy does not matter.
         rule: How.
 
     Returns:
@@ -67,7 +67,7 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
 
     Source: the study's published paths (Kollmitz et al., IROS 2020); the rule as facts about them.
     """
-    # With cell centres at integers, so that neighbours are integer offsets.
+    # with cell centres at integers, neighbours are integer offsets
     rest = _Rest(line - 0.5)
     here, last = ends
     path = [here]
@@ -89,7 +89,7 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
 
 
 class _Rest:
-    """What is left of a line, as segments of which the first is cut shorter and shorter."""
+    """The remaining part of a line, as segments of which the first is cut shorter and shorter."""
 
     def __init__(self, line: FloatArray) -> None:
         #: By axis: where segments end, where they start, and how far they lead.
@@ -100,10 +100,10 @@ class _Rest:
         self.first = 0
 
     def cut_nearest(self, options: IntArray) -> int:
-        """Cut the line at its point nearest to any of the (k, 2) options, and tell which option that is."""
+        """Cut the line at its point nearest to any of the (k, 2) options; the number of that option."""
         left = slice(self.first, None)
         (sx, sy), (ax, ay) = self.start[:, left], self.along[:, left]
-        # Few operations on whole arrays: a path takes some sixty of these steps.
+        # few operations on whole arrays: a path takes about sixty of these steps
         dx, dy = options[:, 0, None] - sx, options[:, 1, None] - sy
         share = (dx * ax + dy * ay) / self.squared[left]
         np.maximum(share, 0.0, out=share)
@@ -125,7 +125,7 @@ class _Passage:
 
     #: (k, 2) column and row; neighbours or equal from one to the next.
     cells: IntArray
-    #: (k,) how much the line has to do with each.
+    #: (k,) weight of each cell: how strongly the line passes it.
     weight: FloatArray
 
 
@@ -137,16 +137,16 @@ def _crossed_cells(line: FloatArray) -> _Passage:
     """
     at = np.unique(np.concatenate([np.arange(len(line), dtype=float), *(_crossings(axis)[0] for axis in line.T)]))
     points = _points(line, at)
-    # Between two crossings the line is in one cell, which its middle tells safely.
+    # between two crossings the line is in one cell, safely found by the middle
     cells = np.floor((points[:-1] + points[1:]) / 2).astype(np.int64)
     return _Passage(cells, np.hypot(*np.diff(points, axis=0).T))
 
 
 def _grid_intersections(line: FloatArray) -> _Passage:
-    """Cells of whose cross through the centre, as wide and high as the cell, a line crosses an arm.
+    """Cells in which a line crosses an arm of the cross through the centre, as wide and high as the cell.
 
     The arms of all cells together are the lines of a square lattice, and those of one square belong to its four corner
-    cells, so that successive cells are neighbours. A corner that is just touched is passed by.
+    cells, so that successive cells are neighbours. A corner that is just touched is left out.
 
     Args:
         line: (n, 2) in cells, as in :func:`_crossed_cells`.
@@ -159,7 +159,7 @@ def _grid_intersections(line: FloatArray) -> _Passage:
         cells[:, axis], cells[:, 1 - axis] = level, np.floor(other)
         ats.append(at)
         found.append(cells)
-        # The nearer to the centre, the more.
+        # the nearer to the centre, the larger
         weights.append(0.5 - np.abs(other - np.floor(other) - 0.5))
     order = np.argsort(np.concatenate(ats), kind="stable")
     return _Passage(np.concatenate(found)[order], np.concatenate(weights)[order])
@@ -168,9 +168,9 @@ def _grid_intersections(line: FloatArray) -> _Passage:
 def _thinned_path(passage: _Passage, first: IntArray, last: IntArray, *, corners: bool) -> IntArray:
     """The cells of a passage without those that an 8-connected path does not need.
 
-    A cell that is entered and left straight back is left out, for that is poses shaking over a border. So is a cell
-    whose neighbours on the path are neighbours on the grid, a corner that can be cut, if corners are not to be kept or
-    it has no weight. The cell with the least weight goes first, until none can.
+    A cell that is entered and left straight back is removed: poses with noise cross borders of cells. So is a cell
+    whose neighbours on the path are neighbours on the grid, which is a corner that can be cut, unless corners are kept
+    and it has a weight. The cell with the least weight is removed first, until no more can be.
 
     Args:
         passage: Cells and weights.
@@ -186,7 +186,7 @@ def _thinned_path(passage: _Passage, first: IntArray, last: IntArray, *, corners
     heapq.heapify(queue)
     while queue:
         weight, i = heapq.heappop(queue)
-        # What was pushed before its surroundings changed was pushed again since.
+        # an entry from before the cell's surroundings changed is followed by a newer one
         if weight == chain.weight[i] < np.inf and chain.gap(i) <= (0 if corners and weight > 0 else 1):
             for j in chain.drop(i):
                 heapq.heappush(queue, (chain.weight[j], j))
@@ -194,11 +194,11 @@ def _thinned_path(passage: _Passage, first: IntArray, last: IntArray, *, corners
 
 
 class _Chain:
-    """A linked list of cells; what left it weighs infinitely much, as its ends do, so that nothing drops it."""
+    """A linked list of cells; removed cells and the ends have infinite weight, so that they are never removed."""
 
     def __init__(self, passage: _Passage, first: IntArray, last: IntArray) -> None:
         self.cells: list[list[int]] = np.concatenate([first[None], passage.cells, last[None]]).tolist()
-        # Rounded, so that on a line along a diagonal, where all weigh the same, every second one goes.
+        # rounded, so that on a diagonal line, where all weights are equal, every second cell is removed
         self.weight: list[float] = [np.inf, *np.round(passage.weight, 9).tolist(), np.inf]
         count = len(self.cells)
         self.before, self.after = list(range(-1, count - 1)), list(range(1, count + 1))
@@ -206,12 +206,12 @@ class _Chain:
             self._join(i)
 
     def gap(self, i: int) -> int:
-        """How far apart the cells before and after an inner one are, along rows or columns."""
+        """Distance of the cells before and after an inner one, along rows or columns."""
         (x0, y0), (x1, y1) = self.cells[self.before[i]], self.cells[self.after[i]]
         return max(abs(x1 - x0), abs(y1 - y0))
 
     def drop(self, i: int) -> tuple[int, ...]:
-        """Leave an inner cell out; those next to it, for which something has changed."""
+        """Remove an inner cell; its neighbours, whose surroundings have changed."""
         one, other = self.before[i], self.after[i]
         self._unlink(i)
         if self._join(other):
@@ -219,7 +219,7 @@ class _Chain:
         return (one, other) if other < len(self.cells) else (one,)
 
     def path(self) -> IntArray:
-        """(k, 2) what is left."""
+        """(k, 2) the remaining cells."""
         i, left = 0, []
         while i < len(self.cells):
             left.append(self.cells[i])
@@ -227,7 +227,7 @@ class _Chain:
         return np.array(left, dtype=np.int64)
 
     def _join(self, i: int) -> bool:
-        """Make one of a cell and the same cell before it."""
+        """Join a cell with an equal one before it."""
         one = self.before[i]
         if self.cells[one] != self.cells[i]:
             return False
@@ -243,13 +243,13 @@ class _Chain:
 
 
 def _crossings(values: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Where a piecewise linear function crosses whole numbers.
+    """Where a piecewise linear function crosses integers.
 
     Args:
         values: (n,) at 0, 1, 2, ...
 
     Returns:
-        (m,) places, and (m,) whole numbers.
+        (m,) places, and (m,) the integers.
     """
     start, end = values[:-1], values[1:]
     low, high = np.ceil(np.minimum(start, end)), np.floor(np.maximum(start, end))

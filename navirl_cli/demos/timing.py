@@ -9,16 +9,16 @@ from navirl_cli.demos.grid import Grid
 from navirl_cli.demos.lines import divided
 from navirl_cli.errors import DemonstrationError
 
-#: The driven line is looked at in pieces no longer than this share of a cell.
+#: Longest piece of the driven line, as a share of a cell.
 PIECE = 1 / 16
 
 
 def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid) -> FloatArray:
     """The times at which a driven line is nearest to the cells of its path.
 
-    Of all times in order, those for which the sum of squared distances between the line and the cells' centres is
-    least: each cell's own nearest point where these are in order, as they are but for corners; where the way crosses
-    itself each cell has the pass that fits its neighbours.
+    Among all times in order, those with the least sum of squared distances between the line and the cells' centres.
+    This is each cell's own nearest point where these points are in order, as they are except at corners. Where the path
+    crosses itself, each cell has the pass that fits its neighbours.
 
     Args:
         xy_m: (n, 2) m, map frame.
@@ -27,10 +27,10 @@ def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid)
         grid: Gives the cells.
 
     Returns:
-        (k,) s, non-decreasing, from the first pose's time to the last pose's; to about a sixteenth of a cell's way.
+        (k,) s, non-decreasing, from the first pose's time to the last pose's; accurate to about a sixteenth of a cell.
 
     Raises:
-        DemonstrationError: There are not at least two poses with their times, and two cells.
+        DemonstrationError: Fewer than two poses with their times, or fewer than two cells.
     """
     if len(xy_m) < 2 or len(cells) < 2 or t_s.shape != xy_m.shape[:1]:
         raise DemonstrationError(
@@ -47,7 +47,7 @@ def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid)
         np.minimum.accumulate(away + least[j - 1], out=least[j])
     at = np.full(len(cells), len(line) - 1)
     for j in range(len(cells) - 2, 0, -1):
-        # The first point that attains the least up to the next cell's.
+        # the first point that attains the least sum up to the next cell's
         at[j] = np.searchsorted(-least[j], -least[j, at[j + 1]])
     at[0] = 0
     found: FloatArray = times[at]
@@ -55,7 +55,7 @@ def cell_times_s(xy_m: FloatArray, t_s: FloatArray, cells: IntArray, grid: Grid)
 
 
 def steps_in_contact(demonstration: Demonstration) -> NDArray[np.bool_]:
-    """Which steps of a demonstration's path were taken while the person pushed, if only for a part of the step.
+    """Which steps of a demonstration's path were taken while the person pushed, at least for a part of the step.
 
     Returns:
         (k - 1,) one for each step between successive cells.
@@ -66,7 +66,7 @@ def steps_in_contact(demonstration: Demonstration) -> NDArray[np.bool_]:
     d = demonstration
     if d.contacts is None:
         raise DemonstrationError(
-            f"demonstration {d.id}: contact is unknown, since it was extracted without a wrench; learn from all steps"
+            f"demonstration {d.id}: contact is unknown, because it was extracted without a wrench; learn from all steps"
         )
     times = cell_times_s(d.xy_m, d.t_s, d.cells, d.grid)
     pushed = np.zeros(len(times) - 1, dtype=bool)

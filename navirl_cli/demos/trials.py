@@ -9,23 +9,23 @@ from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.logs.recording import Recording
 
-#: Slower than this is standing, m/s; the window over which the speed is taken, s.
+#: A slower robot stands, m/s; window over which the speed is measured, s.
 STANDING_M_S = 0.04
 WINDOW_S = 0.5
 #: A robot at rest this near to its goal has arrived, m.
 ARRIVED_M = 0.5
-#: A goal this near to the present one is the same goal said again, m.
+#: A goal this near to the present one is the same goal announced again, m.
 SAME_GOAL_M = 0.05
 #: A trial of the session record this near in time is the one that starts here, s.
 SAME_START_S = 1.0
 #: A rest of this length separates two trials where they are split at stops, s.
 REST_S = 1.0
-#: A trial that covers less is none, m.
+#: A trial that covers less is empty, m.
 MIN_TRAVEL_M = 0.5
 
 
 class Split(StrEnum):
-    """What starts a new trial."""
+    """Where a new trial starts."""
 
     GOAL = "goal"
     STOP = "stop"
@@ -48,9 +48,9 @@ class Trial:
 def trials_of(recording: Recording, split: Split) -> list[Trial]:
     """Split a recording into trials.
 
-    ``goal``: a trial starts when a goal is announced and ends where the robot first comes to rest near it, else where
-    it came nearest before the next goal, so that the drive back belongs to no trial; where the session record says when
-    it ended, it ends there. Saying the present goal again starts none, unless the robot was there and has left.
+    ``goal``: a trial starts when a goal is announced. It ends at the time given in the session record; else where the
+    robot first comes to rest near the goal; else where it was nearest before the next goal. So the drive back belongs
+    to no trial. Announcing the present goal again starts no trial, unless the robot was there and has left.
     ``stop``: trials are the drives between rests. ``none``: one trial.
 
     Args:
@@ -61,7 +61,7 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
         Trials in order of time; those that cover less than half a metre are included, for the caller to report.
 
     Raises:
-        DemonstrationError: There is no goal to split at.
+        DemonstrationError: The recording has no goal to split at.
     """
     standing = speeds_m_s(recording.t_ns, recording.xy_m) < STANDING_M_S
     if split is Split.NONE:
@@ -71,7 +71,7 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
     if len(recording.goal_t_ns) == 0:
         raise DemonstrationError(
             f"{recording.log}: no goal is announced, so that trials cannot be split at goals; "
-            "say where it is with `goal` x,y, or choose `split` stop or `split` none"
+            "give one with `goal` x,y, or choose `split` stop or `split` none"
         )
     return _at_goals(recording, standing)
 
@@ -109,7 +109,7 @@ def _at_goals(recording: Recording, standing: BoolArray) -> list[Trial]:
 
 
 def _is_new(recording: Recording, present: tuple[int, FloatArray], start: int, goal: FloatArray) -> bool:
-    """Whether an announcement starts a trial: another goal, or the same after the robot was there and has left."""
+    """Whether an announcement starts a trial: another goal, or the same one after the robot was there and has left."""
     since, aim = present
     if np.hypot(*(goal - aim)) >= SAME_GOAL_M:
         return True
@@ -122,9 +122,9 @@ def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], g
     first, border = span
     distance = np.hypot(*(recording.xy_m[first:border] - goal).T)
     target = (float(goal[0]), float(goal[1]))
-    said = _said_stop(recording, first, border)
-    if said is not None:
-        return Trial(first, said, target, arrived=bool(distance[said - first - 1] < ARRIVED_M))
+    declared = _declared_stop(recording, first, border)
+    if declared is not None:
+        return Trial(first, declared, target, arrived=bool(distance[declared - first - 1] < ARRIVED_M))
     resting = np.flatnonzero(standing[first:border] & (distance < ARRIVED_M) & _has_left(distance))
     if len(resting):
         return Trial(first, first + int(resting[0]) + 1, target)
@@ -132,8 +132,8 @@ def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], g
     return Trial(first, first + max(nearest, 1) + 1, target, arrived=bool(distance[nearest] < ARRIVED_M))
 
 
-def _said_stop(recording: Recording, first: int, border: int) -> int | None:
-    """One past the last pose of the trial that starts with a pose, where the session record says when it ended."""
+def _declared_stop(recording: Recording, first: int, border: int) -> int | None:
+    """One past the last pose of the trial that starts with a pose, from the session record; None without an entry."""
     start_ns = int(recording.t_ns[first])
     ended = [entry for entry in recording.session.declared if entry.stop_ns is not None]
     entry = min(ended, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
@@ -143,6 +143,6 @@ def _said_stop(recording: Recording, first: int, border: int) -> int | None:
 
 
 def _has_left(distance: FloatArray) -> BoolArray:
-    """(n,) whether the robot has moved since the start: one that waits at an old goal has not arrived at a new one."""
+    """(n,) whether the robot has moved since the start: waiting at an old goal is no arrival at a new one."""
     left: BoolArray = np.abs(distance - distance[0]) > MIN_TRAVEL_M / 2
     return left

@@ -1,4 +1,4 @@
-"""From a log's columns to a recording: one clock, one fixed frame, numbers that can be true."""
+"""From a log's columns to a recording: one clock, one fixed frame, plausible numbers."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -35,7 +35,7 @@ _MAP_FRAME = "map"
 
 
 class Forces(StrEnum):
-    """What becomes of the wrench."""
+    """How the wrench is used."""
 
     NEEDED = "needed"
     #: Taken where the log holds one.
@@ -45,9 +45,9 @@ class Forces(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class LoadOptions(ByContent):
-    """What a user can say about a log."""
+    """The user's choices about a log."""
 
-    #: Topics by role, where there are several that could be meant.
+    #: Topics by role, in place of those that navirl would choose.
     topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
     time: TimeSource = TimeSource.HEADER
     #: The frame that everything is brought into, in place of the map's.
@@ -82,7 +82,7 @@ def load_recording(
         source = Source(source.name, (source,))
     options = options or LoadOptions()
     with ExitStack() as stack:
-        # what is compressed as a whole is decompressed once
+        # a file with whole-file compression is decompressed once
         files = [stack.enter_context(open_log(file)) for file in source.files]
         return _loaded(source, files, options, progress)
 
@@ -102,7 +102,7 @@ def _loaded(source: Source, files: Sequence[RawFile], options: LoadOptions, prog
     occupancy = occupancy_of(map_and_frame, context)
     lost = (*map(str, (*source.damage, *damage)), *context.lost)
     if lost and options.strict:
-        raise LogError(f"{log}: damaged, and `strict` refuses it: {'; '.join(lost)}")
+        raise LogError(f"{log}: damaged, which `strict` refuses: {'; '.join(lost)}")
     return Recording(
         log=log,
         t_ns=poses.t_ns,
@@ -171,7 +171,7 @@ def _context(
     context = Context(log, clock, tree, options.frame or map_and_frame[1] or _MAP_FRAME)
     for (parent, child), count in tree.ignored.items():
         context.note(
-            f"{count} transforms {parent} -> {child} cannot be true, or were sent before the clock ran; ignored"
+            f"{count} transforms {parent} -> {child} are implausible, or were sent before the clock ran; ignored"
         )
     return context, map_and_frame
 

@@ -1,4 +1,4 @@
-"""Maps as nav2_map_server saves them: a YAML file that names a picture and says what its colours mean.
+"""Maps as nav2_map_server saves them: a YAML file that names a picture and defines its colours.
 
 The meaning of colours is that of nav2_map_server (ros-navigation/navigation2, nav2_map_server/src/map_io.cpp).
 """
@@ -27,7 +27,7 @@ _Cells = NDArray[np.int8]
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value of YAML is a number that a map can hold; comparing also bounds endless integers."""
+    """Whether a value of YAML is a number that a map can hold; the bounds also refuse endless integers."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e9 < value < 1e9
 
 
@@ -35,7 +35,7 @@ def _is_share(value: Any) -> bool:
     return _is_number(value) and 0 <= value <= 1
 
 
-#: By key: what is expected, and whether a value is that.
+#: By key: the expected value, and whether a value is as expected.
 _KEYS: Final[dict[str, tuple[str, Callable[[Any], bool]]]] = {
     "image": ("the name of a pgm, png or bmp file", lambda value: isinstance(value, str) and value != ""),
     "resolution": ("m a cell, above 0", lambda value: _is_number(value) and value > 0),
@@ -52,7 +52,7 @@ _KEYS: Final[dict[str, tuple[str, Callable[[Any], bool]]]] = {
 
 @dataclass(frozen=True)
 class _Colours:
-    """What the colours of a picture mean."""
+    """The meaning of a picture's colours."""
 
     mode: str
     negate: bool
@@ -71,7 +71,7 @@ def read_map(path: Path) -> Occupancy:
         The map. Colours of 16 bits a channel are read as 8 bits, grey ones in full.
 
     Raises:
-        LogError: The file or its picture cannot be read, a key is missing or wrong, or the map is turned.
+        LogError: The file or its picture cannot be read, a key is missing or wrong, or the map is rotated.
     """
     document = {"mode": "trinary", **read_mapping(path, _REMEDY)}
     for key, (expected, fits) in _KEYS.items():
@@ -81,7 +81,7 @@ def read_map(path: Path) -> Occupancy:
     x, y, yaw = document["origin"]
     if abs(math.sin(yaw / 2)) > 1e-6:
         raise LogError(
-            f"{path}: key origin: expected a map whose cells run along its frame's axes, found one turned by "
+            f"{path}: key origin: expected a map whose cells run along its frame's axes, found one rotated by "
             f"{math.degrees(yaw):.1f} degrees; save the map with an origin of yaw 0"
         )
     cells = _picture(path, document["image"], _colours(path, document))
@@ -110,7 +110,7 @@ def _picture(path: Path, name: str, colours: _Colours) -> _Cells:
             with Image.open(file, formats=_FORMATS) as image:
                 light, alpha, full = _light(image)
     except FileNotFoundError as error:
-        raise LogError(f"{expected} nothing at {file}; put it there or correct the key") from error
+        raise LogError(f"{expected} no file {file}; put it there or correct the key") from error
     except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
         limit = Image.MAX_IMAGE_PIXELS
         raise LogError(
@@ -125,13 +125,13 @@ def _picture(path: Path, name: str, colours: _Colours) -> _Cells:
 
 
 def _light(image: "Image") -> tuple[NDArray[Any], NDArray[Any] | None, int]:
-    """Red, green and blue of each pixel in sum, its opacity (None where the picture has none), and the most of each."""
+    """Sum of red, green and blue of each pixel, its opacity (None without), and the largest value of a channel."""
     if image.mode.startswith("I"):
         grey = np.asarray(image).astype(np.int32)
         clear = image.info.get("transparency")
         return 3 * grey, None if clear is None else np.where(grey == clear, 0, 65535), 65535
     if image.mode == "F":
-        raise ValueError("its numbers are no colours")
+        raise ValueError("its numbers are not colours")
     if not image.has_transparency_data:
         return np.asarray(image.convert("RGB")).sum(axis=2, dtype=np.uint16), None, 255
     channels = np.asarray(image.convert("RGBA"))
@@ -139,12 +139,12 @@ def _light(image: "Image") -> tuple[NDArray[Any], NDArray[Any] | None, int]:
 
 
 def _cells(light: NDArray[Any], alpha: NDArray[Any] | None, full: int, colours: _Colours) -> _Cells:
-    """Occupancy by pixel; each sum of channels is looked at once, in a table."""
+    """Occupancy by pixel, from a table over the sums of channels."""
     channels = 3
     if colours.mode == "trinary" and alpha is not None:
-        # a habit of ROS 1 that Nav2 keeps: opacity counts as a colour
+        # as in ROS 1, Nav2 counts opacity as a colour
         light, channels = light + alpha, 4
-    # nav2_map_server has 16 bits a channel: its roundings decide about colours that lie on a threshold
+    # nav2_map_server has 16 bits a channel: its rounding decides about colours on a threshold
     shade = np.arange(channels * full + 1) * (65535 // full) / channels / 65535
     occupied = shade if colours.negate else 1 - shade
     if colours.mode == "raw":

@@ -1,4 +1,4 @@
-"""A log as an extraction needs it: poses in the fixed frame, raw forces, people, goals, commands and the map."""
+"""The core type of logs: poses in the fixed frame, raw forces, people, goals, commands and the map."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import LogError
 
-#: Name of the metadata record in which a log says what only the experimenter knows. Keys: "participant", a name; in
-#: JSON "trials", a list of objects with "t_ns", the time of the trial's goal, and any of "stop_ns", "cycle",
-#: "condition", "set" and "nominal_m"; "robot_radius_m"; "completion_s", lists of times by modality; and, where
-#: positions came without times, "laid_out_m_s", the speed at which they were laid out.
+#: Name of the metadata record with what only the experimenter knows. Its keys: "participant", a name; and in JSON
+#: "trials", a list of objects with "t_ns", the time of the trial's goal, and any of "stop_ns", "cycle", "condition",
+#: "set" and "nominal_m"; "robot_radius_m"; "completion_s", lists of times by modality; and, where positions came
+#: without times, "laid_out_m_s", the speed at which they were laid out.
 SESSION_RECORD = "navirl.session"
 #: Name of the metadata record with cells that were published with the paths: key "cells", a JSON list of objects with
 #: "t_ns" (as above), "name" and "cells" (pairs column, row).
@@ -47,7 +47,7 @@ class Occupancy(ByContent):
 class Track(ByContent):
     """Where one person was seen."""
 
-    #: What the log calls the person; by places in the message ("1", "2") where it has no names.
+    #: The person's name in the log; without names the place in the message ("1", "2").
     name: str
     #: (k,) ns, increasing.
     t_ns: IntArray
@@ -65,14 +65,14 @@ class Jump:
 
 @dataclass(frozen=True, eq=False)
 class Declared(ByContent):
-    """What the experimenter's protocol says of the trial that starts at a time."""
+    """The experimenter's entry for the trial that starts at a time."""
 
     t_ns: int
-    #: When it ended, ns; None: where the robot came to rest near its goal.
+    #: When it ended, ns; None: when the robot came to rest near its goal.
     stop_ns: int | None = None
     cycle: int | None = None
     condition: str | None = None
-    #: What the trial was for, where it is not the session's main task: "obstacle course", say.
+    #: Purpose of the trial, such as "obstacle course"; None for the session's main task.
     set: str | None = None
     #: (k, 2) m, fixed frame: the line that the robot's navigation followed.
     nominal_m: FloatArray | None = None
@@ -80,7 +80,7 @@ class Declared(ByContent):
 
 @dataclass(frozen=True, eq=False)
 class Published(ByContent):
-    """The cells that somebody else published for the trial that starts at a time."""
+    """The published cells of the trial that starts at a time."""
 
     t_ns: int
     name: str
@@ -118,19 +118,19 @@ class Recording:
     #: (g,) ns and (g, 2) m, fixed frame.
     goal_t_ns: IntArray
     goal_m: FloatArray
-    #: (m,) ns of every message about people, those that name nobody included.
+    #: (m,) ns of every message about people, those without people included.
     people_t_ns: IntArray
     people: tuple[Track, ...]
     #: (c,) ns and (c,) largest deflection of the joystick, 0..1.
     command_t_ns: IntArray
     command: FloatArray
     session: Session = field(default_factory=Session)
-    #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry does not say.
+    #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
-    #: What is odd about the log, in words.
+    #: What is unusual about the log, in words.
     notes: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:

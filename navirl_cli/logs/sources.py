@@ -1,4 +1,4 @@
-"""What a user's arguments mean: files, bag folders, folders of recordings and patterns become recordings to read."""
+"""From a user's arguments (files, bag folders, folders of recordings, patterns) to the recordings to read."""
 
 import glob
 import os
@@ -17,7 +17,7 @@ from navirl_cli.logs.yaml_file import read_mapping
 
 _METADATA: Final = "metadata.yaml"
 _INFO: Final = "rosbag2_bagfile_information"
-#: A recording's file name; the group leaves out a compression of the whole.
+#: A recording's file name; the group leaves out the ending of whole-file compression.
 _MCAP: Final = re.compile(r"(.*\.mcap)(?:\.(?:zstd|zst|lz4))?", re.IGNORECASE | re.DOTALL)
 
 
@@ -28,9 +28,9 @@ class Source:
     #: File name, or the bag folder's name.
     name: str
     files: tuple[Path, ...]
-    #: Files that should be there and are not.
+    #: Files that are missing.
     damage: tuple[Damage, ...] = ()
-    #: What is odd about the files, in words.
+    #: What is unusual about the files, in words.
     notes: tuple[str, ...] = ()
 
 
@@ -39,63 +39,63 @@ def sources_of(
 ) -> list[Source]:
     """Turn a command's arguments into recordings.
 
-    A file is a recording, whatever its name. A rosbag2 folder is one, with its files in the order that metadata.yaml
-    gives or, where the recorder was killed before it wrote that, in the order of their numbers. In any other folder and
-    below it, every .mcap file and every bag is a recording. A pattern with * ** ? or [ stands for what it matches.
+    A file is a recording, whatever its name. A rosbag2 folder is one, with its files in the order of metadata.yaml or,
+    where the recorder was killed before it wrote that, in the order of their numbers. In any other folder and below it,
+    every .mcap file and every bag is a recording. A pattern with * ** ? or [ stands for all that it matches.
 
     Args:
         arguments: Paths or patterns.
         join: Take all files as one recording, under the name of the first.
-        refused: Takes up what is wrong with arguments, and with bags in folders, where others are good; raised if None.
+        refused: Collects the errors of arguments, and of bags in folders, where others are good; None to raise them.
 
     Returns:
-        The recordings in the order of the arguments, those of a folder or pattern by name (10 behind 9). No file is in
+        The recordings in the order of the arguments, those of a folder or pattern by name (10 after 9). No file is in
         two of them.
 
     Raises:
-        LogError: An argument is not there, holds no recording, or is a bag that navirl cannot read.
+        LogError: An argument is missing, holds no recording, or is a bag that navirl cannot read.
     """
-    trouble: list[LogError] = []
-    sources = _once([source for argument in arguments for source in _tried(_meant, argument, trouble)])
-    if trouble and (refused is None or not sources):
-        raise trouble[0]
+    errors: list[LogError] = []
+    sources = _once([source for argument in arguments for source in _attempted(_of_argument, argument, errors)])
+    if errors and (refused is None or not sources):
+        raise errors[0]
     if refused is not None:
-        refused += trouble
+        refused += errors
     if not join or not sources:
-        return [_hinted(source) for source in sources]
-    whole = sources[0]
+        return [_with_hint(source) for source in sources]
+    joined = sources[0]
     for part in sources[1:]:
-        whole = Source(whole.name, whole.files + part.files, whole.damage + part.damage, whole.notes + part.notes)
-    return [whole]
+        joined = Source(joined.name, joined.files + part.files, joined.damage + part.damage, joined.notes + part.notes)
+    return [joined]
 
 
-def _tried(
-    find: Callable[[Any, list[LogError]], list[Source]], argument: Path | str, trouble: list[LogError]
+def _attempted(
+    find: Callable[[Any, list[LogError]], list[Source]], argument: Path | str, errors: list[LogError]
 ) -> list[Source]:
-    """What is found, or nothing and why."""
+    """The recordings found; none after an error, which is kept."""
     try:
-        return find(argument, trouble)
+        return find(argument, errors)
     except LogError as error:
-        trouble.append(error)
+        errors.append(error)
         return []
 
 
-def _meant(argument: Path | str, trouble: list[LogError]) -> list[Source]:
-    """The recordings that one argument stands for."""
+def _of_argument(argument: Path | str, errors: list[LogError]) -> list[Source]:
+    """The recordings of one argument."""
     path, text = Path(argument), os.fspath(argument)
     if _is_folder(path):
-        found = _recordings(path, set(), trouble)
-        if not found and not trouble:
-            raise LogError(f"{path}: expected .mcap files in this folder or below it, found {_instead(path)}")
+        found = _recordings(path, set(), errors)
+        if not found and not errors:
+            raise LogError(f"{path}: expected .mcap files in this folder or below it, found {_content(path)}")
         return found
     if not _mode(path) and any(sign in text for sign in "*?["):
-        return _matched(text, trouble)
+        return _of_pattern(text, errors)
     check_path(path)
     return [Source(path.name, (path,))]
 
 
-def _instead(folder: Path) -> str:
-    """What a folder without recordings holds, and the remedy."""
+def _content(folder: Path) -> str:
+    """The content of a folder without recordings, and the remedy."""
     entries = _listing(folder)
     for entry in entries:
         if entry.suffix == ".bag":
@@ -106,46 +106,48 @@ def _instead(folder: Path) -> str:
     return f"{_some(entries) or 'an empty one'}; give the folder that holds the recordings"
 
 
-def _matched(pattern: str, trouble: list[LogError]) -> list[Source]:
-    """The recordings that a pattern stands for."""
+def _of_pattern(pattern: str, errors: list[LogError]) -> list[Source]:
+    """The recordings that a pattern matches."""
     matches = sorted({Path(match) for match in glob.iglob(pattern, recursive=True)}, key=_natural)  # noqa: PTH207
     folders = {match for match in matches if _is_folder(match)}
-    # what stands in a folder that matches is found with the folder
+    # files in a folder that matches are found with the folder
     matches = [match for match in matches if not folders.intersection(match.parents)]
     others = [match for match in matches if match not in folders and not _MCAP.fullmatch(match.name)]
     seen: set[Path] = set()
     found: list[Source] = []
     for match in matches:
         if match in folders:
-            found += _recordings(match, seen, trouble)
+            found += _recordings(match, seen, errors)
         elif match not in others:
             found.append(Source(match.name, (match,)))
     if found and others:
         note = f"{pattern}: {len(others)} other files match and are left out: {_some(others)}"
         found[0] = replace(found[0], notes=(*found[0].notes, note))
-    # where no name is that of an MCAP file others were meant: reading says what they are
+    # without any name of an MCAP file the others are meant: reading them gives the error
     found = found or [Source(file.name, (file,)) for file in others]
-    if not found and not trouble:
-        what = f"folders without any ({_some(matches)})" if matches else "nothing"
-        raise LogError(f"{pattern}: expected a pattern that matches recordings, found that it matches {what}; check it")
+    if not found and not errors:
+        matched = f"folders without any ({_some(matches)})" if matches else "no file"
+        raise LogError(
+            f"{pattern}: expected a pattern that matches recordings, found one that matches {matched}; check it"
+        )
     return found
 
 
-def _recordings(folder: Path, seen: set[Path], trouble: list[LogError]) -> list[Source]:
-    """The recordings in a folder and below it, possibly none; `seen` are folders that need no second look."""
+def _recordings(folder: Path, seen: set[Path], errors: list[LogError]) -> list[Source]:
+    """The recordings in a folder and below it, possibly none; folders in `seen` are skipped."""
     here = folder.resolve()
     if here in seen:
         return []
     seen.add(here)
     entries = _listing(folder)
     files = [entry for entry in entries if _MCAP.fullmatch(entry.name) and not _is_folder(entry)]
-    bag = _described(folder, here.name, files) if folder / _METADATA in entries else Source(here.name, ())
+    bag = _of_metadata(folder, here.name, files) if folder / _METADATA in entries else Source(here.name, ())
     if bag.files:
         return [bag]
     found = _loose(folder, here.name, files)
     for entry in entries:
         if _is_folder(entry):
-            found += _tried(lambda below, trouble: _recordings(below, seen, trouble), entry, trouble)
+            found += _attempted(lambda below, errors: _recordings(below, seen, errors), entry, errors)
     if found:
         found[0] = replace(found[0], damage=bag.damage + found[0].damage, notes=bag.notes + found[0].notes)
     elif bag.damage:
@@ -156,8 +158,8 @@ def _recordings(folder: Path, seen: set[Path], trouble: list[LogError]) -> list[
     return found
 
 
-def _described(folder: Path, name: str, files: Sequence[Path]) -> Source:
-    """The recording that metadata.yaml describes; without files if it cannot be used or lists none that is there."""
+def _of_metadata(folder: Path, name: str, files: Sequence[Path]) -> Source:
+    """The recording that metadata.yaml describes; without files where it is unusable or all its files are missing."""
     try:
         listed, info = _listed(folder / _METADATA)
     except LogError as error:
@@ -178,7 +180,7 @@ def _described(folder: Path, name: str, files: Sequence[Path]) -> Source:
 
 
 def _listed(path: Path) -> tuple[list[str], Mapping[Any, Any]]:
-    """The names of a bag's files by its metadata.yaml, and what else that says of the bag."""
+    """The names of a bag's files by its metadata.yaml, and the rest of its content."""
     remedy = "the folder's files are taken without it"
     info = read_mapping(path, remedy).get(_INFO)
     if not isinstance(info, dict):
@@ -205,50 +207,50 @@ def _refuse_foreign(folder: Path, listed: Iterable[str], info: Mapping[Any, Any]
 
 
 def _same(wanted: Path, files: Sequence[Path]) -> Path | None:
-    """A file by its name, else the same one compressed or decompressed as a whole."""
+    """A file by its name, else the same one with or without whole-file compression."""
     if stat.S_ISREG(_mode(wanted)):
         return wanted
     return next((file for file in files if _plain(file) == _plain(wanted)), None)
 
 
 def _loose(folder: Path, name: str, files: Sequence[Path]) -> list[Source]:
-    """The recordings among files that no metadata.yaml describes: pieces named like the folder are one of them."""
+    """The recordings among files without metadata.yaml: pieces named like the folder are one recording."""
     chosen: dict[str, Path] = {}
-    # a file as it is stands before its compressed forms
+    # a plain file goes before its compressed forms
     for file in files:
         chosen.setdefault(_plain(file), file)
     pieces = _pieces(name, chosen.values())
-    found = [Source(name, tuple(pieces.values()), tuple(_holes(folder, name, pieces)))] if pieces else []
+    found = [Source(name, tuple(pieces.values()), tuple(_missing_pieces(folder, name, pieces)))] if pieces else []
     alone = set(chosen.values()).difference(pieces.values())
     found += [Source(file.name, (file,)) for file in files if file in alone]
     if left := [file.name for file in files if file not in chosen.values()]:
-        note = f"{name}: left out as other forms of files that are there: {', '.join(left)}"
+        note = f"{name}: left out as compressed copies of other files: {', '.join(left)}"
         found[0] = replace(found[0], notes=(note,))
     return found
 
 
 def _pieces(name: str, files: Iterable[Path]) -> dict[int, Path]:
-    """Those files that rosbag2 would write into a folder of this name, by their numbers in order."""
+    """The files that rosbag2 would write into a folder of this name, by their numbers in order."""
     pattern = re.compile(re.escape(name) + r"_(0|[1-9][0-9]*)\.mcap", re.IGNORECASE)
     found = {int(match[1]): file for file in files if (match := pattern.fullmatch(_plain(file)))}
-    # a date is no number of a piece
+    # a date is not the number of a piece
     limit = max(1000, 2 * len(found))
     return {number: found[number] for number in sorted(found) if number < limit}
 
 
-def _holes(folder: Path, name: str, numbers: Iterable[int]) -> Iterator[Damage]:
-    """The pieces missing before and between those that are there; rosbag2 counts from 0."""
+def _missing_pieces(folder: Path, name: str, numbers: Iterable[int]) -> Iterator[Damage]:
+    """The pieces missing before and between those found; rosbag2 counts from 0."""
     following = 0
     for number in numbers:
         if number > following:
             upto = f" and those up to {name}_{number - 1}.mcap" if number - following > 1 else ""
-            reason = f"no such file, though later pieces of the recording are there; its messages{upto} are lost"
+            reason = f"missing, while later pieces of the recording exist; its messages{upto} are lost"
             yield Damage(folder / f"{name}_{following}.mcap", 0, 0, reason)
         following = number + 1
 
 
 def _once(sources: Sequence[Source]) -> list[Source]:
-    """Leave out files that are there already, also by a link; of two recordings that of more files keeps them."""
+    """Read no file twice, also not through a link; of two recordings the one with more files keeps it."""
     owners: dict[tuple[int, int], int] = {}
     files: defaultdict[int, list[Path]] = defaultdict(list)
     notes: defaultdict[int, list[str]] = defaultdict(list)
@@ -267,8 +269,8 @@ def _once(sources: Sequence[Source]) -> list[Source]:
     ]
 
 
-def _hinted(source: Source) -> Source:
-    """Say of a file that is given alone when it is a piece of a longer recording."""
+def _with_hint(source: Source) -> Source:
+    """A file given alone, with a note where it is a piece of a longer recording."""
     file = source.files[0]
     folder = file.absolute().parent
     if source.name != file.name or not _pieces(folder.name, [file]):
@@ -281,13 +283,13 @@ def _hinted(source: Source) -> Source:
 
 
 def _plain(file: Path) -> str:
-    """A file's name without the compression of the whole."""
+    """A file's name without the ending of whole-file compression."""
     match = _MCAP.fullmatch(file.name)
     return match[1] if match else file.name
 
 
 def _natural(path: Path) -> tuple[list[str | int], str]:
-    """Sorts piece 10 behind piece 9."""
+    """Sorts piece 10 after piece 9."""
     parts = re.split(r"([0-9]+)", str(path).casefold())
     return [int(part) if number % 2 else part for number, part in enumerate(parts)], str(path)
 
@@ -298,7 +300,7 @@ def _some(paths: Sequence[Path]) -> str:
 
 
 def _listing(folder: Path) -> list[Path]:
-    """What a folder holds, by name; hidden files apart."""
+    """The content of a folder, by name, without hidden files."""
     try:
         entries = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
     except OSError as error:
@@ -311,7 +313,7 @@ def _is_folder(path: Path) -> bool:
 
 
 def _mode(path: Path) -> int:
-    """What the system says a path is, 0 where nothing is found."""
+    """The mode of a path, 0 where it does not exist."""
     try:
         return path.stat().st_mode
     except OSError:

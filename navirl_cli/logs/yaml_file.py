@@ -11,7 +11,7 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
 
     Args:
         path: The file.
-        remedy: What to do when it is none, for the message.
+        remedy: What to do where the file is something else, for the message.
 
     Returns:
         Plain dicts, lists, texts and numbers.
@@ -27,18 +27,18 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
         document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise LogError(f"{path}: expected a YAML file, found: {error.strerror}; {remedy}") from error
-    # beside its own errors ruamel lets pass those of int(), datetime() and deep nesting
+    # ruamel also raises the errors of int(), datetime() and deep nesting
     except (YAMLError, ValueError, LookupError, RecursionError) as error:
         raise LogError(f"{expected} {_problem(error)}; {remedy}") from error
     if document is None:
-        raise LogError(f"{expected} nothing; {remedy}")
+        raise LogError(f"{expected} an empty file; {remedy}")
     if not isinstance(document, dict):
         raise LogError(f"{expected} {brief(document)}; {remedy}")
     return document
 
 
 def _problem(error: Exception) -> str:
-    """What a parser complains about, on one line, with the line of the file where it says so."""
+    """The problem that a parser reports, on one line, with the line of the file where it is known."""
     mark = getattr(error, "problem_mark", None)
     where = f"line {mark.line + 1}: " if mark is not None else ""
     words = str(getattr(error, "problem", None) or error)

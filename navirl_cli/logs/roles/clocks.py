@@ -1,8 +1,8 @@
 """When a message was measured, on one clock for the whole recording.
 
-A header's stamp is the time of the measurement; the time of receipt stands in where there is none. The clock of a
-recording is that of its odometry's stamps. It may be simulated, may be another computer's than the recorder's, and may
-jump; where another topic's stamps go by another clock, the times of receipt tell the offset between the two.
+A header's stamp is the time of the measurement; a message without a stamp has its time of receipt. The clock of a
+recording is that of its odometry's stamps. It may be simulated, belong to another computer than the recorder's, and
+jump. Where another topic is stamped by another clock, the times of receipt give the offset between the two.
 """
 
 from dataclasses import dataclass, field
@@ -16,15 +16,15 @@ from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 NS_PER_S = 1_000_000_000
 #: A clock that moves by more than this against the recorder's between two messages has jumped, s.
 JUMP_S = 1.0
-#: Stamps farther from where their clock should be belong to another clock, s: no robot's messages take so long.
+#: Stamps farther than this from the expected time belong to another clock, s: no robot's messages take so long.
 APART_S = 0.25
-#: Stamps that move by more against their clock until the end, s, belong to another one too; below this, the offset
-#: between two clocks is taken to be constant.
+#: Stamps that drift by more than this until the end belong to another clock too, s. An offset that changes by less than
+#: the second number is taken to be constant.
 _DRIFT_S, _CONSTANT_S = 0.1, 0.02
-#: From so many messages on another clock's offset is known.
+#: The offset of another clock is estimated from at least this many messages.
 _MIN_MESSAGES = 20
-#: Widths of medians over offsets, messages: against single wrong stamps, and against the time that messages take, which
-#: is also a time in s, for a recorder's disk stalls all topics at once.
+#: Widths of medians over offsets, messages: against single wrong stamps, and against the time that messages take. The
+#: second is also a time in s, because a recorder's disk stalls all topics at once.
 _OUTLIERS, _LATENCY, _LATENCY_S = 5, 51, 2.0
 #: A time of receipt this far from all others is wrong, s.
 _ANOTHER_DAY_S = 3600.0
@@ -33,7 +33,7 @@ EARLIEST_NS = 365 * 86_400 * NS_PER_S
 
 
 class TimeSource(StrEnum):
-    """What the times of a recording are."""
+    """Which times the messages of a recording have."""
 
     HEADER = "header"
     LOG = "log"
@@ -46,10 +46,10 @@ class Stamped:
     topic: str
     #: (n,) ns of receipt, ascending.
     log_ns: IntArray
-    #: (n,) ns, 0 where there is no stamp; None for messages without a header.
+    #: (n,) ns, 0 for a missing stamp; None for messages without a header.
     stamp_ns: IntArray | None
-    #: Whether a message says what is so from its receipt on, such as a goal; others may be older, such as a map that is
-    #: sent to whoever comes late.
+    #: Whether a message counts from its receipt on, such as a goal. Others may be older than their receipt, such as a
+    #: map that is sent to late subscribers.
     momentary: bool = False
 
 
@@ -64,11 +64,11 @@ class Clock:
 
     reference: Stamped
     source: TimeSource = TimeSource.HEADER
-    #: What is odd about the stamps, in words.
+    #: What is unusual about the stamps, in words.
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Follow the reference's offset to the recorder's clock over time."""
+        """Track the reference's offset from the recorder's clock over time."""
         log_ns, stamp_ns = self.reference.log_ns, self.reference.stamp_ns
         stamp_ns = np.zeros_like(log_ns) if stamp_ns is None else stamp_ns
         stamped = np.flatnonzero(stamp_ns != 0)
@@ -76,7 +76,7 @@ class Clock:
             self.source = TimeSource.LOG
             if len(log_ns):
                 self.notes.append(f"no message on {self.reference.topic} has a stamp; times of receipt are used")
-        #: Offset at the first stamp, ns: what follows is relative to it, so that floats hold it.
+        #: Offset at the first stamp, ns. Later offsets are relative to it, so that floats hold them.
         self._base_ns = 0
         self._shifts_ns = np.zeros(1, dtype=np.int64)
         self._at_ns = log_ns[stamped[:1]] if self.source is TimeSource.HEADER else np.zeros(1, dtype=np.int64)
@@ -86,7 +86,7 @@ class Clock:
 
     @property
     def offset_ns(self) -> int:
-        """What the clock shows beyond the recorder's at its start."""
+        """Offset of the clock from the recorder's at the start, ns."""
         return self._base_ns
 
     @property
@@ -98,7 +98,7 @@ class Clock:
         return middle > EARLIEST_NS > middle + self._base_ns
 
     def times(self, one: Stamped) -> IntArray:
-        """Times of messages on this clock, (n,) ns; what was odd about them is noted."""
+        """Times of messages on this clock, (n,) ns; what is unusual about them is noted."""
         if self.source is TimeSource.LOG:
             return one.log_ns.copy()
         expected = self._expected(one.log_ns)
@@ -112,7 +112,7 @@ class Clock:
             times = times - np.where(stamped, self._apart(one, _seconds(times - expected), stamped), 0)
         away = _seconds(times - expected)
         wild = stamped & (np.abs(away) > JUMP_S) & ~_received_wrongly(times, one.log_ns, away)
-        if self._at_ns[0] == self._at_ns[-1]:  # a converter that gives all messages one time of receipt says nothing
+        if self._at_ns[0] == self._at_ns[-1]:  # some converters give all messages one time of receipt
             wild[:] = False
         if wild.any() and (one.momentary or len(times) >= _MIN_MESSAGES):
             self._note(one, int(wild.sum()), f"have stamps more than {JUMP_S:g} s off their clock")
@@ -142,12 +142,12 @@ class Clock:
         for row in jumps.tolist():
             at_s = (int(log_ns[row]) - int(log_ns[0])) / NS_PER_S
             self.notes.append(
-                f"the clock jumps by {jumped[row + 1] - jumped[row]:+.2f} s {at_s:.1f} s after the start; what follows "
-                "was moved to continue"
+                f"the clock jumps by {jumped[row + 1] - jumped[row]:+.2f} s {at_s:.1f} s after the start; later "
+                "times were shifted to continue"
             )
 
     def _expected(self, log_ns: IntArray) -> IntArray:
-        """What the clock shows when messages are received, (n,) ns."""
+        """The clock's time when messages are received, (n,) ns."""
         first = int(self._at_ns[0])
         # differences first: nanoseconds since 1970 do not fit into a float
         at_s, known_s = _seconds(log_ns - first), _seconds(self._at_ns - first)
@@ -158,17 +158,17 @@ class Clock:
         return shown
 
     def _apart(self, one: Stamped, away_s: FloatArray, stamped: BoolArray) -> IntArray:
-        """How far another clock's stamps are from this one's, (n,) ns; 0 where it is the same clock."""
+        """Offset of another clock's stamps from this clock, (n,) ns; 0 where it is the same clock."""
         rows = np.flatnonzero(stamped)
-        nothing = np.zeros(len(away_s), dtype=np.int64)
+        none = np.zeros(len(away_s), dtype=np.int64)
         if rows.size < _MIN_MESSAGES:
-            return nothing
+            return none
         at_s = _seconds(one.log_ns - one.log_ns[0])
         steady, jumped = _steady(away_s[rows], one.log_ns[rows])
         steady = jumped + _smooth(steady - jumped, at_s[rows])
         middle, change = float(np.median(steady)), float(steady[-1] - steady[0])
         if abs(middle) <= APART_S and abs(change) <= _DRIFT_S:
-            return nothing
+            return none
         drifts = f", changing by {change:+.2f} s until the end" if abs(change) > _DRIFT_S else ""
         self.notes.append(
             f"{one.topic} is stamped by another clock than {self.reference.topic}: {middle:+.3f} s by the times of "
@@ -177,8 +177,8 @@ class Clock:
         apart = np.interp(at_s, at_s[rows], steady) if np.ptp(steady) > _CONSTANT_S else np.full(len(away_s), middle)
         return np.round(apart * NS_PER_S).astype(np.int64)
 
-    def _note(self, one: Stamped, count: int, what: str) -> None:
-        self.notes.append(f"{count} messages on {one.topic} {what}; the time of their receipt stands in")
+    def _note(self, one: Stamped, count: int, problem: str) -> None:
+        self.notes.append(f"{count} messages on {one.topic} {problem}; their times of receipt are used")
 
 
 def in_order(topic: str, times_ns: IntArray) -> tuple[IntArray, list[str]]:
@@ -189,7 +189,7 @@ def in_order(topic: str, times_ns: IntArray) -> tuple[IntArray, list[str]]:
         times_ns: (n,) ns in order of receipt.
 
     Returns:
-        (m,) rows, and notes on what was out of order or came twice.
+        (m,) rows, and notes on messages out of order or repeated.
     """
     notes = []
     _, rows = np.unique(times_ns, return_index=True)
@@ -207,16 +207,16 @@ def _seconds(ns: IntArray) -> FloatArray:
 
 
 def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) -> BoolArray:
-    """Say which times are far from their receipt by the recorder's fault.
+    """Which times are far from their receipt because the receipt is wrong.
 
     Args:
         times_ns: (n,) ns on the recording's clock.
         log_ns: (n,) ns of receipt, ascending.
-        away_s: (n,) s by which times are off what the clock showed at their receipt.
+        away_s: (n,) s, times - expected times at their receipt.
 
     Returns:
-        (n,) True where a time is too old, but in order among those that are not, since the recorder stood still; and
-        where it lies among them, but its receipt on another day.
+        (n,) True where a time is too old, but in order among the others, because the recorder stalled; and where a time
+        lies among the others, but its receipt on another day.
     """
     near = np.flatnonzero(np.abs(away_s) <= JUMP_S)
     if not near.size:
@@ -233,10 +233,10 @@ def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) 
 
 
 def _steady(offset_s: FloatArray, log_ns: IntArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) s, the offset of a clock without single wrong values; and (n,) s, how far it has jumped until then."""
+    """(n,) s, the offset of a clock without single wrong values; and (n,) s, the sum of its jumps until then."""
     steady = _running_median(offset_s)
     steps = np.diff(steady, prepend=steady[:1])
-    # what is more than the time between two messages is no slow simulation
+    # a slow simulation cannot shift the offset by more than the time between two messages
     jumps = np.abs(steps) > JUMP_S + _seconds(np.diff(log_ns, prepend=log_ns[:1]))
     return steady, np.cumsum(np.where(jumps, steps, 0.0))
 
@@ -246,8 +246,8 @@ def _running_median(values: FloatArray, ends: Literal["even", "odd"] = "even") -
 
     Args:
         values: (n,) in order.
-        ends: How the row goes on beyond its ends: mirrored, so that a wrong value at an end is no majority, or turned
-            about, so that a rise goes on.
+        ends: How the values continue beyond their ends: "even", mirrored, so that a wrong value at an end is no
+            majority; or "odd", point-mirrored, so that a rise continues.
     """
     if len(values) < _OUTLIERS:
         return values.copy()
@@ -265,11 +265,11 @@ def _smooth(values: FloatArray, at_s: FloatArray) -> FloatArray:
     """
     count = max(1, min(-(-len(values) // _LATENCY), int((at_s[-1] - at_s[0]) / _LATENCY_S)))
     blocks = zip(np.array_split(at_s, count), np.array_split(values, count), strict=True)
-    # in time, not in rows: across a silence the clock goes on
+    # in time, not in rows: the clock continues across a gap
     middles, medians = np.array([(np.median(at), np.median(block)) for at, block in blocks]).T
     middles, first = np.unique(middles, return_index=True)
     medians = _running_median(medians[first], "odd")
-    if len(middles) > 1:  # the ends go on as their neighbours do
+    if len(middles) > 1:  # the ends continue as their neighbours do
         apart = np.diff(middles)[[0, -1]]
         beyond = np.clip(at_s[[0, -1]] - middles[[0, -1]], -apart, apart)
         ends = medians[[0, -1]] + np.diff(medians)[[0, -1]] / apart * beyond

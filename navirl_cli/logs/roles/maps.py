@@ -21,7 +21,7 @@ def map_in(log: str, topics: Sequence[Columns]) -> tuple[Occupancy, str]:
     yaw = float(2 * np.arctan2(last["qz"], last["qw"]))
     if abs(np.sin(yaw / 2)) > 1e-6:
         raise LogError(
-            f"{log}: expected a map whose cells run along its frame's axes, found one turned by "
+            f"{log}: expected a map whose cells run along its frame's axes, found one rotated by "
             f"{np.degrees(yaw):.1f} degrees; save the map with an origin of yaw 0"
         )
     origin = (float(last["px"]), float(last["py"]))
@@ -35,20 +35,20 @@ def map_in(log: str, topics: Sequence[Columns]) -> tuple[Occupancy, str]:
     if size != height * width or size == 0:
         raise LogError(f"{log}: expected a map of {height} x {width} cells, found {size}; record the map again")
     data = columns["data"][-size:].astype(np.int8)
-    # A float32 of 0.1 is 0.10000000149 as a double: the shortest decimal is what was meant.
+    # a float32 of 0.1 is 0.10000000149 as a double: the shortest decimal was meant
     resolution = float(str(np.float32(last["resolution"])))
     return Occupancy(data.reshape(height, width), resolution, origin), str(last["frame"])
 
 
 def occupancy_of(map_and_frame: tuple[Occupancy, str], context: Context) -> Occupancy:
-    """A map brought into the fixed frame, which must not be turned against the map's.
+    """A map in the fixed frame, which must not be rotated against the map's frame.
 
     Args:
         map_and_frame: The map and its frame; "" for one that is in the fixed frame.
         context: Clock and frames.
 
     Raises:
-        LogError: The fixed frame is turned against the map's, or moves.
+        LogError: The fixed frame is rotated against the map's, or moves.
         FrameError: tf does not connect the frames.
     """
     occupancy, frame = map_and_frame
@@ -62,8 +62,8 @@ def occupancy_of(map_and_frame: tuple[Occupancy, str], context: Context) -> Occu
     moved, yaw = into.translation_m[:, :2], into.yaw_rad
     if np.abs(yaw).max() > 1e-3 or np.abs(moved - moved[0]).max() > occupancy.resolution_m / 10:
         raise LogError(
-            f"{context.log}: the map's frame {frame!r} is turned against {context.fixed!r} or moves in it, so that its "
-            f"cells cannot be kept; choose `frame` {frame}, or give a map in {context.fixed!r} with `map`"
+            f"{context.log}: the map's frame {frame!r} is rotated against {context.fixed!r} or moves in it, so that "
+            f"its cells cannot be kept; choose `frame` {frame}, or give a map in {context.fixed!r} with `map`"
         )
     x, y = occupancy.origin_m
     return Occupancy(occupancy.data, occupancy.resolution_m, (x + float(moved[0, 0]), y + float(moved[0, 1])))

@@ -1,4 +1,4 @@
-"""What only the experimenter knows of a session, as metadata records of the log say it."""
+"""What the experimenter knows of a session, from metadata records of the log."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -17,14 +17,14 @@ Value = TypeVar("Value")
 
 
 def session_of(log: str, contents: Iterable[Contents]) -> Session:
-    """What the last record of each name says.
+    """The session by the last record of each name.
 
     Args:
         log: The recording's name, for messages.
         contents: Of its files.
 
     Raises:
-        LogError: A record is not as it should be.
+        LogError: A record holds something else than expected.
     """
     last: dict[str, Mapping[str, str]] = {}
     for one in contents:
@@ -34,11 +34,11 @@ def session_of(log: str, contents: Iterable[Contents]) -> Session:
     cells = "a JSON list of objects with t_ns (ns), name and cells (pairs of whole numbers)"
     return Session(
         participant=session.values.get("participant"),
-        declared=session.told("trials", _all(_declared), trials) or (),
-        published=published.told("cells", _all(_published), cells) or (),
-        robot_radius_m=session.told("robot_radius_m", _positive, "metres above 0"),
-        laid_out_m_s=session.told("laid_out_m_s", _positive, "metres a second above 0"),
-        completion_s=session.told("completion_s", _times, "a JSON object of lists of seconds by modality") or {},
+        declared=session.parsed("trials", _all(_declared), trials) or (),
+        published=published.parsed("cells", _all(_published), cells) or (),
+        robot_radius_m=session.parsed("robot_radius_m", _positive, "metres above 0"),
+        laid_out_m_s=session.parsed("laid_out_m_s", _positive, "metres a second above 0"),
+        completion_s=session.parsed("completion_s", _times, "a JSON object of lists of seconds by modality") or {},
     )
 
 
@@ -50,8 +50,8 @@ class _Record:
     name: str
     values: Mapping[str, str]
 
-    def told(self, key: str, parse: Callable[[Any], Value], expected: str) -> Value | None:
-        """What a key says in JSON; None where it is not there."""
+    def parsed(self, key: str, parse: Callable[[Any], Value], expected: str) -> Value | None:
+        """The value of a key, from JSON; None where the key is missing."""
         if key not in self.values:
             return None
         try:
@@ -64,12 +64,12 @@ class _Record:
 
 
 def _all(parse: Callable[[Any], Value]) -> Callable[[Iterable[Any]], tuple[Value, ...]]:
-    """The same for each entry of a list."""
+    """A parser of lists, from that of one entry."""
     return lambda entries: tuple(parse(entry) for entry in entries)
 
 
 def _declared(entry: Mapping[str, Any]) -> Declared:
-    """One entry, with its types checked: a number as text would go on as text."""
+    """One entry, with its types checked."""
     t_ns, stop_ns, cycle, condition, part = (entry.get(key) for key in ("t_ns", "stop_ns", "cycle", "condition", "set"))
     if type(t_ns) is not int or (cycle is not None and (type(cycle) is not int or cycle < 1)):
         raise TypeError(f"t_ns {t_ns!r} and cycle {cycle!r} must be whole numbers, a cycle from 1 on")
@@ -95,14 +95,14 @@ def _published(entry: Mapping[str, Any]) -> Published:
     """The cells of one path."""
     t_ns, cells = entry["t_ns"], np.array(entry["cells"])
     if type(t_ns) is not int or cells.dtype.kind != "i" or cells.ndim != 2 or cells.shape[1] != 2:
-        raise TypeError(f"t_ns {t_ns!r} must be a whole number, and cells pairs of such")
+        raise TypeError(f"t_ns {t_ns!r} must be a whole number, and cells pairs of whole numbers")
     return Published(t_ns, str(entry["name"]), cells.astype(np.int64))
 
 
 def _positive(value: Any) -> float:
     """A finite number above 0."""
     if type(value) not in {int, float} or not (isfinite(value) and value > 0):
-        raise ValueError(f"{value!r} is none")
+        raise ValueError(f"{value!r} is not a positive number")
     return float(value)
 
 

@@ -95,20 +95,20 @@ ROLES: Final = (
     Role(
         "people",
         message_types.PEOPLE,
-        "messages that can only be about people first, then those whose names say so",
-        "say where they stand with `person` x,y",
+        "message types for people first, then topics named after people",
+        "give their places with `person` x,y",
     ),
     Role(
         "goal",
         message_types.GOALS,
-        "a goal by name first, then any lone pose, then the end of a plan",
-        "say where it is with `goal` x,y, or choose `split` stop or `split` none",
+        "a topic named after goals first, then any single pose, then the end of a plan",
+        "give it with `goal` x,y, or choose `split` stop or `split` none",
     ),
     Role(
         "joystick",
         message_types.COMMANDS,
-        "joysticks, and velocities whose topics say that a hand gives them; navigation publishes on the others",
-        "name the topic of velocities that a hand gave with `topic` joystick=/name",
+        "joysticks, and velocities on topics named after manual control; navigation publishes on the others",
+        "name the topic of manual velocities with `topic` joystick=/name",
         ranked=False,
     ),
     Role(
@@ -125,13 +125,13 @@ ROLES: Final = (
 
 
 def is_missing(choice: Choice, chosen: Mapping[str, Choice]) -> bool:
-    """Whether a log lacks what nothing in it replaces, or the choice is the user's."""
+    """Whether a needed role has no topic and no substitute, or the user must choose one."""
     replaced = choice.role.name == "odometry" and not choice.ambiguous and bool(chosen["tf"].topics)
     return bool(choice.problem) and (choice.ambiguous or choice.role.needed) and not replaced
 
 
 def short_name(type_name: str) -> str:
-    """A message type as people write it."""
+    """A message type as ROS users write it."""
     return type_name.replace("/msg/", "/")
 
 
@@ -218,7 +218,7 @@ def _problem(role: Role, of_type: Sequence[Topic]) -> str:
 
 
 def refusal(log: str, topics: Mapping[str, Topic], choice: Choice) -> LogError:
-    """The error that a log does not hold what is needed."""
+    """The error that a log lacks a needed topic."""
     if not topics:
         return LogError(
             f"{log}: holds no messages: the file ends before the first one; copy it again, or use another recording"

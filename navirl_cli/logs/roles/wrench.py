@@ -32,9 +32,7 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         raise LogError(f"{context.log}: topic {columns.topic}: expected forces, found none that are finite")
     frame = named or own
     if not frame:
-        context.note(
-            f"{columns.topic} names no frame; it is taken to be {base!r}, unless `wrench_frame` says otherwise"
-        )
+        context.note(f"{columns.topic} names no frame; {base!r} is assumed; name another with `wrench_frame`")
         frame = base
     stamps, rows = context.ordered_times(columns)
     t_ns, force = stamps[rows], columns.stacked(*_FORCE)[rows]
@@ -43,8 +41,8 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         mounted = context.tree.lookup(base, frame, t_ns[:1] if span is None else np.clip(t_ns, *span))
     except FrameError as error:
         raise FrameError(
-            f"{context.log}: the wrench is given in frame {frame!r}: {error}; or say with `wrench_frame` which frame "
-            "its axes are parallel to"
+            f"{context.log}: the wrench is given in frame {frame!r}: {error}; or name a frame with "
+            "parallel axes with `wrench_frame`"
         ) from error
     turns = mounted.matrices
     if span is not None:
