@@ -236,5 +236,5 @@ def test_without_a_pooled_reward_there_is_no_pooled_policy():
 def test_a_hallway_without_room_has_no_such_scene():
     along_a_wall = make.scene_on(make.open_grid(40, 14), [2, 0], [37, 0])
     beside_obstacle(along_a_wall, 0.3)
-    with pytest.raises(SceneError, match="no free way"):
+    with pytest.raises(SceneError, match="no free path"):
         beside_obstacle(along_a_wall, 1.0)

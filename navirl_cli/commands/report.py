@@ -48,13 +48,9 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     from navirl_cli.evaluation.compare import compare
     from navirl_cli.evaluation.ranks import ranks_of
     from navirl_cli.figures.report import draw_report
-<<<<<<< HEAD
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
-    from navirl_cli.reports.reward import report_of
-=======
     from navirl_cli.reports.reward import METRICS, report_of
->>>>>>> evaluation
 
     if output.suffix != ".html":
         raise ArtefactError(f"{output}: expected a name that ends in .html, found {output.suffix!r}")

@@ -55,7 +55,7 @@ class Scene:
         if first < 0 or last < 0:
             (x0, y0), (x1, y1) = grid.centres_of(start), grid.centres_of(goal)
             raise SceneError(
-                f"goal unreachable: no free way on the map from x {x0:.2f} m, y {y0:.2f} m to x {x1:.2f} m, "
+                f"goal unreachable: no free path on the map from x {x0:.2f} m, y {y0:.2f} m to x {x1:.2f} m, "
                 f"y {y1:.2f} m; check the map, the goal and the robot's radius"
             )
         return Scene(lattice, first, last, np.asarray(people_m, dtype=float).reshape(-1, 2))

@@ -15,7 +15,7 @@ from navirl_cli.documents.tables import Column, Table
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
-from navirl_cli.evaluation.metrics import BY_NAME, PAPERMETRICS
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Rank
 from navirl_cli.reports.evaluation import group_table, uniform_line
 from navirl_cli.reports.extraction import trial_table
@@ -42,7 +42,7 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: Beside the paper's three, where they are known.
-METRICS = [*PAPERMETRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
+METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 #: Rank below which a demonstration is reported as rare.
 _RARE = 0.01
 
