@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
 from navirl_cli.demos.gain import Gain, pooled
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
+from navirl_cli.files import Input
 
 #: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
 DECIMALS = 6

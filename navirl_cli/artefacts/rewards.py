@@ -9,9 +9,10 @@ import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
-from navirl_cli.artefacts.store import Input, number, numbers, read_json, row
+from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError
+from navirl_cli.files import Input
 from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.profile import Profile

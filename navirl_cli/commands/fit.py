@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from navirl_cli.artefacts.rewards import Analyses, LearntReward, read_reward, read_reward_for, reward_document
-from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
@@ -30,7 +30,7 @@ from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import DemonstrationError, NavirlError, RewardError
-from navirl_cli.files import check_writable
+from navirl_cli.files import Input, check_writable
 from navirl_cli.irl.bias import corrected
 from navirl_cli.irl.bootstrap import bootstrap as draw_again
 from navirl_cli.irl.evidence import Evidence, evidence_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.store import Input, number
+from navirl_cli.artefacts.store import number
 from navirl_cli.documents.tables import Column, Format, Table, formatted, written
 from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison
 from navirl_cli.evaluation.drawn import Precision
@@ -15,6 +15,7 @@ from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
 Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
