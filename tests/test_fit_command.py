@@ -173,7 +173,7 @@ def test_steps_in_contact_alone(navirl, files, evidence):
     assert values_of(document) == pytest.approx(fit(evidence.only(masks), Reward.named({}), 0.1).reward.theta, rel=1e-6)
     assert "16 demonstrations of 4 participants, 96 steps; " in text
     message = navirl("fit", files / "quiet.json", "-o", "q.json", "--steps", "contact", code=1).stderr
-    assert message == "navirl: --steps contact: in none of the demonstrations did the person push\n"
+    assert message == "navirl: `steps` contact: none of the demonstrations holds a contact; learn from all steps\n"
 
 
 def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
