@@ -9,6 +9,10 @@ class NavirlError(Exception):
     """Base of all trouble that navirl expects and can explain."""
 
 
+class ArgumentError(NavirlError):
+    """An argument of a call cannot be right, whatever the data hold."""
+
+
 class LogError(NavirlError):
     """A log cannot be read, or does not hold what is needed."""
 

@@ -309,7 +309,7 @@ def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monke
     def nothing(*_args, **_options):
         raise RewardError("`profile` a_p: a better fit was found on the way")
 
-    monkeypatch.setattr("navirl_cli.commands.fit.follow_profile", nothing)
+    monkeypatch.setattr("navirl_cli.irl.analyses.profile", nothing)
     told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
     assert told.stderr.endswith("navirl: --profile a_p: a better fit was found on the way\n")
     assert read_reward(Path("r.json")).profiles == ()
@@ -322,7 +322,9 @@ def test_a_prior_must_be_a_maximum_and_should_be_of_others(navirl, files):
     document = json.loads((files / "reward.json").read_text())
     Path("early.json").write_text(json.dumps({**document, "status": "stopped early"}))
     told = navirl("fit", files / "one.json", "-o", "s.json", "--prior", "early.json", code=1).stderr
-    assert "navirl: --prior: that fit is not at its maximum (stopped early), and no prior; fit it anew" in told
+    assert (
+        "navirl: `prior`: expected a fit at its maximum, found one that ended with stopped early" in told
+    )
 
 
 def test_the_bias_is_taken_off_and_told(navirl, files):

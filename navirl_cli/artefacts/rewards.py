@@ -11,14 +11,14 @@ from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.errors import ArtefactError, NavirlError
+from navirl_cli.errors import ArtefactError, NavirlError, RewardError
 from navirl_cli.files import Input
-from navirl_cli.irl.bootstrap import Bootstrap
+from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
 from navirl_cli.irl.reward import Reward, terms_with
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.validation import Validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +49,17 @@ class LearntReward(ByContent):
     #: None of files from before it was kept.
     search: Search | None = None
 
+    def as_prior(self) -> Prior:
+        """What this fit leaves to the next one.
 
-@dataclass(frozen=True)
-class Analyses:
-    """What was asked of a fit besides."""
-
-    bootstrap: Bootstrap | None = None
-    profiles: tuple[Profile, ...] = ()
-    validation: Validation | None = None
+        Raises:
+            RewardError: The fit did not reach its maximum, or its covariance is not positive definite.
+        """
+        if self.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+            raise RewardError(
+                f"`prior`: expected a fit at its maximum, found one that ended with {self.status.value}; fit it again"
+            )
+        return Prior.gaussian(np.array(self.reward.theta), self.covariance)
 
 
 def reward_document(
@@ -64,7 +67,7 @@ def reward_document(
     demonstrations: Sequence[Demonstration],
     inputs: Sequence[Input],
     resolution_m: float,
-    analyses: Analyses = Analyses(),
+    analyses: Analyses | None = None,
     learnt_from: str = "all",
 ) -> dict[str, Any]:
     """A fit, and what was asked of it besides, as the content of a reward file.
@@ -77,6 +80,7 @@ def reward_document(
         analyses: What was asked besides.
         learnt_from: "all" steps or those during "contact".
     """
+    analyses = analyses or Analyses()
     return {
         "inputs": [vars(one) for one in inputs],
         "parameters": _parameters(fit),

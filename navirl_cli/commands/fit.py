@@ -1,14 +1,11 @@
 """``navirl fit``: demonstrations to a reward."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from math import isfinite, nan
 from pathlib import Path
 
 import click
-import numpy as np
 
-from navirl_cli.artefacts.rewards import Analyses, LearntReward, read_reward, read_reward_for, reward_document
+from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
@@ -28,20 +25,14 @@ from navirl_cli.commands.shared import (
 from navirl_cli.commands.usage import as_options
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
-from navirl_cli.errors import NavirlError, RewardError
+from navirl_cli.errors import RewardError
 from navirl_cli.files import Input, check_writable
-from navirl_cli.irl.bias import corrected
-from navirl_cli.irl.bootstrap import bootstrap as draw_again
+from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.profile import number_of
-from navirl_cli.irl.profile import profile as follow_profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps, select
-from navirl_cli.irl.status import Status
-from navirl_cli.irl.validation import cross_validate as leave_out
 from navirl_cli.reports.fit import remarks, report, warnings
 
 
@@ -161,17 +152,11 @@ def fit(
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
     if earlier is not None and not initial:
         start = earlier.reward
-    # What would be refused after the fit is refused before it.
-    for name in profiles:
-        number_of(start, name)
-    for argument, wanted in (("bootstrap", bootstrap), ("cross_validate", cross_validate)):
-        if wanted:
-            evidence.several_people(argument)
-    found = _learn(evidence, start, earlier, l2, Method(method))
-    lost: list[str] = []
-    with _kept(lost):
-        found = corrected(evidence, found) if correct_bias else found
-    analyses = _analyses(evidence, found, bootstrap, profiles, seed, lost, held_out=bool(cross_validate))
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)
+    questions.check(evidence, start, Steps(steps), prior=earlier is not None)
+    found, analyses, lost = answers(
+        evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
+    )
     document = reward_document(
         found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps
     )
@@ -185,58 +170,17 @@ def fit(
     finish(lost)
 
 
-@contextmanager
-def _kept(lost: list[str]) -> Iterator[None]:
-    """Trouble with a question about a fit is no trouble with the fit: it is told at the end."""
-    try:
-        yield
-    except NavirlError as error:
-        lost.append(str(error))
-
-
 def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: float, method: Method) -> Fit:
     """The fit, with a bar."""
-    prior = None
-    if earlier is not None:
-        if earlier.status in {Status.STOPPED_EARLY, Status.INFINITE}:
-            raise RewardError(
-                f"--prior: that fit is not at its maximum ({earlier.status.value}), and no prior; fit it anew"
-            )
-        prior = Prior.gaussian(np.array(earlier.reward.theta), earlier.covariance)
     with progress_bar("fit") as update:
         return fit_reward(
             evidence,
             start,
             l2,
-            prior=prior,
+            prior=None if earlier is None else earlier.as_prior(),
             method=method,
             progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
         )
-
-
-def _analyses(
-    evidence: Evidence,
-    found: Fit,
-    replicates: int | None,
-    names: Sequence[str],
-    seed: int,
-    lost: list[str],
-    *,
-    held_out: bool,
-) -> Analyses:
-    """What was asked for besides the fit; what cannot be said is added to ``lost``."""
-    drawn = validation = None
-    followed = []
-    if replicates:
-        with _kept(lost), progress_bar("bootstrap", replicates) as update:
-            drawn = draw_again(evidence, found, replicates, seed, progress=update)
-    for name in dict.fromkeys(names):
-        with _kept(lost), progress_bar("profile") as update:
-            followed.append(follow_profile(evidence, found, name, progress=update))
-    if held_out:
-        with _kept(lost), progress_bar("cross-validation", len(evidence.people)) as update:
-            validation = leave_out(evidence, found.initial, found.l2, progress=update)
-    return Analyses(drawn, tuple(followed), validation)
 
 
 def _start(initial: str) -> Reward:
