@@ -41,6 +41,14 @@ class ArtefactError(NavirlError):
     """A file that navirl reads or writes is missing, exists already or breaks its schema."""
 
 
+class MissingPackageError(NavirlError):
+    """An optional package is not installed."""
+
+
+class NavirlWarning(UserWarning):
+    """Results stand, but something was lost, skipped or not reached; only the Python interface uses it."""
+
+
 def brief(value: object) -> str:
     """A value as a message shows it: on one line, and not longer than a line."""
     text = " ".join(repr(value).split())

@@ -144,7 +144,19 @@ def read_reward(path: Path) -> LearntReward:
     Raises:
         ArtefactError: As in :func:`read_json`, or the parameters are none of a reward.
     """
-    document = read_json(path, "reward")
+    return learnt_of(read_json(path, "reward"), str(path))
+
+
+def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
+    """The reward of a file's content.
+
+    Args:
+        document: As :func:`reward_document` makes it.
+        path: Where it comes from, for messages.
+
+    Raises:
+        ArtefactError: The parameters are none of a reward.
+    """
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
     try:
@@ -154,7 +166,7 @@ def read_reward(path: Path) -> LearntReward:
     covariance = [row(one) for one in document["covariance"]]
     if len(covariance) != len(names) or any(len(one) != len(names) for one in covariance):
         raise ArtefactError(f"{path}: covariance: expected {len(names)} rows of {len(names)} numbers")
-    profiles = tuple(profile_of(one, names, str(path)) for one in document["profiles"])
+    profiles = tuple(profile_of(one, names, path) for one in document["profiles"])
     return LearntReward(
         reward=reward,
         covariance=np.array(covariance),
@@ -166,7 +178,7 @@ def read_reward(path: Path) -> LearntReward:
     )
 
 
-def _search(content: Mapping[str, Any] | None, count: int, path: Path) -> Search | None:
+def _search(content: Mapping[str, Any] | None, count: int, path: str) -> Search | None:
     """The way of the search in a file.
 
     Raises:
@@ -190,10 +202,19 @@ def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> Lear
             means something else where steps have another length.
     """
     learnt = read_reward(path)
+    check_cells(learnt, demonstrations, str(path))
+    return learnt
+
+
+def check_cells(learnt: LearntReward, demonstrations: Sequence[Demonstration], name: str) -> None:
+    """Refuse a reward on cells of another size than those that it was learnt on.
+
+    Raises:
+        ArtefactError: The sizes differ; the message begins with the name.
+    """
     others = {d.grid.resolution_m for d in demonstrations if not np.isclose(d.grid.resolution_m, learnt.resolution_m)}
     if others:
         raise ArtefactError(
-            f"{path}: learnt on cells of {learnt.resolution_m:g} m, but the demonstrations lie on cells of "
-            f"{min(others):g} m; extract them with --resolution {learnt.resolution_m:g}, or fit anew"
+            f"{name}: learnt on cells of {learnt.resolution_m:g} m, but the demonstrations lie on cells of "
+            f"{min(others):g} m; extract them with `resolution` {learnt.resolution_m:g}, or fit again"
         )
-    return learnt

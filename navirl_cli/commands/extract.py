@@ -1,13 +1,12 @@
 """``navirl extract``: logs to demonstrations."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document
+from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
@@ -166,7 +165,7 @@ def extract(
         found = extract_recordings(logs, settings, options, join=join, progress=update)
     demonstrations = found.demonstrations()
     inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
-    document = demonstrations_document(demonstrations, inputs, asdict(settings) | _said(options, map_file))
+    document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file))
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
     write_json(output, "demonstrations", document, force=force)
@@ -183,15 +182,3 @@ def _echo(trials: Table, document: Mapping[str, Any], *, as_json: bool) -> None:
         echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
     else:
         echo(to_text([trials, *([gain_table(document["gain"])] if document.get("gain") else [])]))
-
-
-def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
-    """What the user said about the log, as it is written down."""
-    return {
-        "topics": {role: list(names) for role, names in options.topics.items()},
-        "time": options.time.value,
-        "frame": options.frame,
-        "wrench_frame": options.wrench_frame,
-        "wrench": options.forces is not Forces.IGNORED,
-        "map": None if map_file is None else map_file.name,
-    }
