@@ -15,8 +15,8 @@ from sphinx.util import logging
 from navirl_cli.artefacts.store import schema_path
 from navirl_cli.cli import COMMANDS, cli
 from navirl_cli.documents.tables import Format, Table, written
-from navirl_cli.evaluation.metrics import METRICS
 from navirl_cli.logs.roles.topics import ROLES
+from navirl_cli.reports.evaluation import metrics_table
 
 HERE = Path(__file__).parent.parent
 GENERATED = HERE / "_generated"
@@ -115,9 +115,7 @@ def unescaped(table: str) -> str:
 
 def metrics() -> Iterator[tuple[str, str]]:
     """All metrics."""
-    rows = [(f"`{one.name}`", one.unit, one.of.value, one.definition, one.source) for one in METRICS]
-    table = Table.of_texts(("name", "unit", "needs", "definition", "source"), rows)
-    yield "metrics.md", unescaped(written(table, Format.MARKDOWN)) + "\n"
+    yield "metrics.md", written(metrics_table(), Format.MARKDOWN) + "\n"
 
 
 def formats() -> Iterator[tuple[str, str]]:

@@ -280,7 +280,7 @@ def fit(
         found, analyses, lost = answers(selected.evidence, found, questions, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
-    notes = (*remarks(selected.demonstrations, earlier, chosen_by=conditions), *fit_warnings(found))
+    notes = (*remarks(selected.demonstrations, earlier, chosen_by=conditions), *fit_warnings(document))
     ended = [] if found.status is Status.CONVERGED else [f"fit: {found.status.value}: {found.status.advice}"]
     _warn([*ended, *lost])
     return FittedReward.of(
@@ -334,7 +334,7 @@ def evaluate(
     )
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
-    result = compare(demos, learnt, drawing, rng, fields=fields)
+    result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
     compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in pairs_in(pair)]
     ranked = ranks_of(demos, next(iter(learnt.values())), drawing.samples, rng) if ranks else []
     inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]

@@ -12,6 +12,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.files import Input
 from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.fit import warnings
 
 PathLike: TypeAlias = str | Path
 #: A learnt reward, or values by the names of the parameters; what is not named keeps its initial value.
@@ -60,7 +61,7 @@ def read_reward(path: PathLike) -> FittedReward:
     path = Path(path)
     document = read_json(path, "reward")
     content = {key: value for key, value in document.items() if key not in {"format", "version", "navirl"}}
-    return FittedReward.of(learnt_of(document, str(path)), content, file=Input.of(path))
+    return FittedReward.of(learnt_of(document, str(path)), content, notes=tuple(warnings(content)), file=Input.of(path))
 
 
 def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Demonstration]:

@@ -23,7 +23,7 @@ from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import by_group, group_of
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.ranks import ranks_of, uniformity
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
@@ -258,7 +258,7 @@ def ranks(
     demonstrations = demonstrations_in(demos)
     found = ranks_of(demonstrations, reward_in(reward, demonstrations), samples, np.random.default_rng(seed))
     shares = np.array([one.rank for one in found])
-    return _drawn(lambda panels: draw_ranks(panels[0], shares), _own(axes), page)[0]
+    return _drawn(lambda panels: draw_ranks(panels[0], shares, uniformity(found)[1]), _own(axes), page)[0]
 
 
 def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) -> "list[Axes]":

@@ -14,7 +14,8 @@ from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
-from navirl_cli.documents.tables import ENDINGS, Column, Format, Table, written
+from navirl_cli.documents.tables import ENDINGS, Format
+from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArgumentError, MissingPackageError
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.metrics import Metric
@@ -28,7 +29,7 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
 from navirl_cli.reports.evaluation import tables
-from navirl_cli.reports.extraction import trial_row, trial_table
+from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import report
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class Demonstrations(Sequence[Demonstration]):
 
     def __repr__(self) -> str:
         """The table of trials."""
-        return trial_table([trial_row(one) for one in self])
+        return to_text([trial_table(self)])
 
     def sources(self) -> tuple[Input, ...]:
         """The file that the trials were read from, or the logs that they were extracted from."""
@@ -109,7 +110,7 @@ class Demonstrations(Sequence[Demonstration]):
         Raises:
             NavirlError: pandas is not installed.
         """
-        return frame_of([trial_row(one) for one in self])
+        return frame_of(trial_table(self).records())
 
     def write(self, path: str | Path, *, force: bool = False) -> None:
         """Write a demonstrations file, as ``navirl extract -o``.
@@ -170,11 +171,7 @@ class FittedReward(LearntReward):
 
     def __repr__(self) -> str:
         """The parameters and how the fit ended, as ``navirl fit`` prints them."""
-        if self.fit is not None and self.analyses is not None:
-            return "\n".join((report(self.fit, self.analyses), *(f"note: {line}" for line in self.notes)))
-        columns = (Column("parameter"), Column("value", decimals=4), Column("std. error"), Column("unit"))
-        rows = tuple((p["name"], p["value"], p["standard_error"], p["unit"] or "1") for p in self._parameters())
-        return f"{written(Table(columns, rows))}\n\nstatus  {self.status.value}: {self.status.advice}"
+        return "\n".join((to_text(report(self.document or {})), *(f"note: {line}" for line in self.notes)))
 
     def _parameters(self) -> list[dict[str, Any]]:
         """The parameters as in the file."""
