@@ -3,8 +3,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS := $(VENV)/.installed-docs
+FLOORS := .venv-floors
+PIP := -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test clean
+.PHONY: demo test test-all test-floors test-wheel docs clean
 
 demo: $(STAMP)
 	PATH="$(CURDIR)/$(BIN):$$PATH" sh sample_logs/demo.sh
@@ -15,11 +18,35 @@ test: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/pytest -q -n auto
 
+# The slow tests too, the installed wheel in an empty environment among them.
+test-all: $(STAMP)
+	$(BIN)/pytest -q -n auto -m "slow or not slow"
+
+test-wheel: $(STAMP)
+	$(BIN)/pytest -q -m slow tests/test_wheel.py
+
+# Weekly: the tests with the lowest version that pyproject.toml allows of every dependency.
+test-floors:
+	rm -rf $(FLOORS)
+	$(PYTHON) -m venv $(FLOORS)
+	$(PYTHON) tests/floors.py > $(FLOORS)/constraints.txt
+	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev]'
+	$(FLOORS)/bin/pytest -q -n auto
+
+# The site, in docs/_build/html; a warning is an error.
+docs: $(DOCS)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo 'docs/_build/html/index.html'
+
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "navirl needs Python 3.11 or newer; choose one with: make PYTHON=/path/to/python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python $(PIP) --editable '.[dev]'
+	touch $@
+
+$(DOCS): $(STAMP)
+	$(BIN)/python $(PIP) --editable '.[docs]'
 	touch $@
 
 clean:
-	rm -rf $(VENV) demo build dist
+	rm -rf $(VENV) $(FLOORS) demo build dist docs/_build docs/_generated

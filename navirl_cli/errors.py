@@ -9,6 +9,10 @@ class NavirlError(Exception):
     """Base of all trouble that navirl expects and can explain."""
 
 
+class ArgumentError(NavirlError):
+    """An argument of a call cannot be right, whatever the data hold."""
+
+
 class LogError(NavirlError):
     """A log cannot be read, or does not hold what is needed."""
 
@@ -35,6 +39,14 @@ class RewardError(NavirlError):
 
 class ArtefactError(NavirlError):
     """A file that navirl reads or writes is missing, exists already or breaks its schema."""
+
+
+class MissingPackageError(NavirlError):
+    """An optional package is not installed."""
+
+
+class NavirlWarning(UserWarning):
+    """Results stand, but something was lost, skipped or not reached; only the Python interface uses it."""
 
 
 def brief(value: object) -> str:

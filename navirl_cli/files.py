@@ -1,12 +1,38 @@
-"""Files that appear whole or not at all."""
+"""Files: named with their hash when they are read, and written as a whole or not at all."""
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 
 from navirl_cli.errors import ArtefactError
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file that something was made from."""
+
+    file: str
+    sha256: str
+
+    @staticmethod
+    def of(path: Path) -> "Input":
+        """Name and hash of a file.
+
+        Raises:
+            ArtefactError: It cannot be read.
+        """
+        digest = sha256()
+        try:
+            with path.open("rb") as stream:
+                while block := stream.read(1 << 20):
+                    digest.update(block)
+        except OSError as error:
+            raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
+        return Input(path.name, digest.hexdigest())
 
 
 @contextmanager

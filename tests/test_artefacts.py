@@ -12,11 +12,12 @@ from robot_log import Run, write_run
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, read_demonstrations
 from navirl_cli.artefacts.rewards import Analyses, read_reward, read_reward_for, reward_document
-from navirl_cli.artefacts.store import Input, read_json, schema_path, write_json
+from navirl_cli.artefacts.store import read_json, schema_path, write_json
 from navirl_cli.demos.demonstration import PersonTrack
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.demos.gain import Gain
 from navirl_cli.errors import ArtefactError
+from navirl_cli.files import Input
 from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit

@@ -173,7 +173,7 @@ def test_steps_in_contact_alone(navirl, files, evidence):
     assert values_of(document) == pytest.approx(fit(evidence.only(masks), Reward.named({}), 0.1).reward.theta, rel=1e-6)
     assert "16 demonstrations of 4 participants, 96 steps; " in text
     message = navirl("fit", files / "quiet.json", "-o", "q.json", "--steps", "contact", code=1).stderr
-    assert message == "navirl: --steps contact: in none of the demonstrations did the person push\n"
+    assert message == "navirl: --steps contact: none of the demonstrations holds a contact; learn from all steps\n"
 
 
 def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
@@ -309,7 +309,7 @@ def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monke
     def nothing(*_args, **_options):
         raise RewardError("`profile` a_p: a better fit was found on the way")
 
-    monkeypatch.setattr("navirl_cli.commands.fit.follow_profile", nothing)
+    monkeypatch.setattr("navirl_cli.irl.analyses.profile", nothing)
     told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
     assert told.stderr.endswith("navirl: --profile a_p: a better fit was found on the way\n")
     assert read_reward(Path("r.json")).profiles == ()
@@ -322,7 +322,7 @@ def test_a_prior_must_be_a_maximum_and_should_be_of_others(navirl, files):
     document = json.loads((files / "reward.json").read_text())
     Path("early.json").write_text(json.dumps({**document, "status": "stopped early"}))
     told = navirl("fit", files / "one.json", "-o", "s.json", "--prior", "early.json", code=1).stderr
-    assert "navirl: --prior: that fit is not at its maximum (stopped early), and no prior; fit it anew" in told
+    assert "navirl: --prior: expected a fit at its maximum, found one that ended with stopped early" in told
 
 
 def test_the_bias_is_taken_off_and_told(navirl, files):

@@ -104,7 +104,7 @@ class TestCommand:
     def test_fits_that_ask_for_contact_are_refused(self, navirl, tmp_path):
         navirl("extract", write_run(tmp_path / "run.mcap", NONE), "-o", "demos.json", "--no-wrench")
         result = navirl("fit", "demos.json", "-o", "reward.json", "--only-corrected", code=1)
-        assert "demos.json: --only-corrected: whether the person intervened is unknown of run/1" in result.stderr
+        assert "--only-corrected: expected demonstrations with a wrench, found run/1" in result.stderr
         result = navirl("fit", "demos.json", "-o", "reward.json", "--steps", "contact", code=1)
         assert "demonstration run/1: contact is unknown, because it was extracted without a wrench" in result.stderr
 

@@ -19,6 +19,10 @@ def test_an_installed_wheel_goes_from_log_to_figure(tmp_path):
     run(sys.executable, "-m", "venv", tmp_path / "env")
     run(tmp_path / "env" / "bin" / "pip", "install", *(tmp_path / "dist").glob("*.whl"))
     navirl = tmp_path / "env" / "bin" / "navirl"
+    typed = (
+        "import navirl_cli; from pathlib import Path; print(Path(navirl_cli.__file__).with_name('py.typed').exists())"
+    )
+    assert run(tmp_path / "env" / "bin" / "python", "-c", typed).stdout == "True\n"
     run(navirl, "extract", ROOT / "sample_logs" / "p01.mcap", "-o", "demos.json")
     run(navirl, "fit", "demos.json", "--cycle", "2", "-o", "reward.json")
     run(navirl, "evaluate", "demos.json", "--reward", "reward.json", "-o", "metrics.json")

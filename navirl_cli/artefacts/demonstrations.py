@@ -2,17 +2,21 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.gain import Gain, pooled
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
+from navirl_cli.files import Input
+from navirl_cli.logs.load import Forces, LoadOptions
 
 #: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
 DECIMALS = 6
@@ -35,6 +39,24 @@ def demonstrations_document(
             for digest, grid in grids.items()
         },
         "demonstrations": [_written(demonstration) for demonstration in demonstrations],
+    }
+
+
+def settings_document(settings: ExtractSettings, options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
+    """The choices of an extraction, for the reader of a file.
+
+    Args:
+        settings: Of the extraction.
+        options: The user's choices about the logs.
+        map_file: The map in place of the log's.
+    """
+    return asdict(settings) | {
+        "topics": {role: list(names) for role, names in options.topics.items()},
+        "time": options.time.value,
+        "frame": options.frame,
+        "wrench_frame": options.wrench_frame,
+        "wrench": options.forces is not Forces.IGNORED,
+        "map": None if map_file is None else map_file.name,
     }
 
 
@@ -63,7 +85,19 @@ def read_demonstrations(path: Path) -> list[Demonstration]:
     Raises:
         ArtefactError: As in :func:`read_json`, or a demonstration contradicts itself.
     """
-    document = read_json(path, "demonstrations")
+    return demonstrations_of(read_json(path, "demonstrations"), str(path))
+
+
+def demonstrations_of(document: Mapping[str, Any], path: str) -> list[Demonstration]:
+    """The demonstrations of a file's content.
+
+    Args:
+        document: As :func:`demonstrations_document` makes it.
+        path: Where it comes from, for messages.
+
+    Raises:
+        ArtefactError: A demonstration contradicts itself.
+    """
     try:
         grids = {digest: _grid(content) for digest, content in document["maps"].items()}
         found = [_read(content, grids) for content in document["demonstrations"]]

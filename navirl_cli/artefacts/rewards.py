@@ -9,15 +9,16 @@ import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
-from navirl_cli.artefacts.store import Input, number, numbers, read_json, row
+from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.errors import ArtefactError, NavirlError
-from navirl_cli.irl.bootstrap import Bootstrap
+from navirl_cli.errors import ArtefactError, NavirlError, RewardError
+from navirl_cli.files import Input
+from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
 from navirl_cli.irl.reward import Reward, terms_with
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.validation import Validation
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +49,17 @@ class LearntReward(ByContent):
     #: None of files from before it was kept.
     search: Search | None = None
 
+    def as_prior(self) -> Prior:
+        """What this fit leaves to the next one.
 
-@dataclass(frozen=True)
-class Analyses:
-    """What was asked of a fit besides."""
-
-    bootstrap: Bootstrap | None = None
-    profiles: tuple[Profile, ...] = ()
-    validation: Validation | None = None
+        Raises:
+            RewardError: The fit did not reach its maximum, or its covariance is not positive definite.
+        """
+        if self.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+            raise RewardError(
+                f"`prior`: expected a fit at its maximum, found one that ended with {self.status.value}; fit it again"
+            )
+        return Prior.gaussian(np.array(self.reward.theta), self.covariance)
 
 
 def reward_document(
@@ -63,7 +67,7 @@ def reward_document(
     demonstrations: Sequence[Demonstration],
     inputs: Sequence[Input],
     resolution_m: float,
-    analyses: Analyses = Analyses(),
+    analyses: Analyses | None = None,
     learnt_from: str = "all",
 ) -> dict[str, Any]:
     """A fit, and what was asked of it besides, as the content of a reward file.
@@ -76,6 +80,7 @@ def reward_document(
         analyses: What was asked besides.
         learnt_from: "all" steps or those during "contact".
     """
+    analyses = analyses or Analyses()
     return {
         "inputs": [vars(one) for one in inputs],
         "parameters": _parameters(fit),
@@ -139,7 +144,19 @@ def read_reward(path: Path) -> LearntReward:
     Raises:
         ArtefactError: As in :func:`read_json`, or the parameters are none of a reward.
     """
-    document = read_json(path, "reward")
+    return learnt_of(read_json(path, "reward"), str(path))
+
+
+def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
+    """The reward of a file's content.
+
+    Args:
+        document: As :func:`reward_document` makes it.
+        path: Where it comes from, for messages.
+
+    Raises:
+        ArtefactError: The parameters are none of a reward.
+    """
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
     try:
@@ -149,7 +166,7 @@ def read_reward(path: Path) -> LearntReward:
     covariance = [row(one) for one in document["covariance"]]
     if len(covariance) != len(names) or any(len(one) != len(names) for one in covariance):
         raise ArtefactError(f"{path}: covariance: expected {len(names)} rows of {len(names)} numbers")
-    profiles = tuple(profile_of(one, names, str(path)) for one in document["profiles"])
+    profiles = tuple(profile_of(one, names, path) for one in document["profiles"])
     return LearntReward(
         reward=reward,
         covariance=np.array(covariance),
@@ -161,7 +178,7 @@ def read_reward(path: Path) -> LearntReward:
     )
 
 
-def _search(content: Mapping[str, Any] | None, count: int, path: Path) -> Search | None:
+def _search(content: Mapping[str, Any] | None, count: int, path: str) -> Search | None:
     """The way of the search in a file.
 
     Raises:
@@ -185,10 +202,19 @@ def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> Lear
             means something else where steps have another length.
     """
     learnt = read_reward(path)
+    check_cells(learnt, demonstrations, str(path))
+    return learnt
+
+
+def check_cells(learnt: LearntReward, demonstrations: Sequence[Demonstration], name: str) -> None:
+    """Refuse a reward on cells of another size than those that it was learnt on.
+
+    Raises:
+        ArtefactError: The sizes differ; the message begins with the name.
+    """
     others = {d.grid.resolution_m for d in demonstrations if not np.isclose(d.grid.resolution_m, learnt.resolution_m)}
     if others:
         raise ArtefactError(
-            f"{path}: learnt on cells of {learnt.resolution_m:g} m, but the demonstrations lie on cells of "
-            f"{min(others):g} m; extract them with --resolution {learnt.resolution_m:g}, or fit anew"
+            f"{name}: learnt on cells of {learnt.resolution_m:g} m, but the demonstrations lie on cells of "
+            f"{min(others):g} m; extract them with `resolution` {learnt.resolution_m:g}, or fit again"
         )
-    return learnt

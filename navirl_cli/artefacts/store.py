@@ -2,9 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -15,30 +13,6 @@ from navirl_cli import __version__
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import replacing
-
-
-@dataclass(frozen=True)
-class Input:
-    """A file that something was made from."""
-
-    file: str
-    sha256: str
-
-    @staticmethod
-    def of(path: Path) -> "Input":
-        """Name and hash of a file.
-
-        Raises:
-            ArtefactError: It cannot be read.
-        """
-        digest = sha256()
-        try:
-            with path.open("rb") as stream:
-                while block := stream.read(1 << 20):
-                    digest.update(block)
-        except OSError as error:
-            raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
-        return Input(path.name, digest.hexdigest())
 
 
 def write_json(path: Path, kind: str, content: Mapping[str, Any], *, force: bool) -> None:

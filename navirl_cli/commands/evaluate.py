@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
@@ -31,7 +31,7 @@ from navirl_cli.evaluation.groups import FIELDS
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
-from navirl_cli.files import check_writable, replacing
+from navirl_cli.files import Input, check_writable, replacing
 from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.evaluation import document, metrics_table, tables
 

@@ -1,19 +1,18 @@
 """``navirl extract``: logs to demonstrations."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document
-from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.extraction import all_extracted
+from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
     Point,
+    bytes_bar,
     echo,
     echo_json,
     finish,
@@ -26,12 +25,13 @@ from navirl_cli.commands.shared import (
     topics_by_role,
 )
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
-from navirl_cli.demos.extract import ExtractSettings, numbered
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.rasterize import Rule
+from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.tables import Table
 from navirl_cli.documents.text import to_text
-from navirl_cli.files import check_writable
+from navirl_cli.files import Input, check_writable
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.roles.clocks import TimeSource
@@ -161,19 +161,18 @@ def extract(
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,
     )
-    good, failed = all_extracted(logs, settings, options, join=join)
-    results = [result for _, result in good]
-    demonstrations = numbered(results)
-    inputs = [file for files, _ in good for file in files] + ([] if map_file is None else [Input.of(map_file)])
-    document = demonstrations_document(demonstrations, inputs, asdict(settings) | _said(options, map_file))
+    with bytes_bar("extract") as update:
+        found = extract_recordings(logs, settings, options, join=join, progress=update)
+    demonstrations = found.demonstrations()
+    inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
+    document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file))
     if gain:
-        document["gain"] = gain_document([(result.log, result.gain) for result in results])
+        document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
     write_json(output, "demonstrations", document, force=force)
     _echo(trial_table(demonstrations), document, as_json=as_json)
-    notes = [note for result in results for note in result.notes] + published_notes(results)
-    for line in merged([*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]):
+    for line in merged([*found.notes(demonstrations), *published_notes(found.extractions)]):
         say(line)
-    finish([*failed, *(line for result in results for line in (*result.damage, *result.skipped))])
+    finish(found.lost)
 
 
 def _echo(trials: Table, document: Mapping[str, Any], *, as_json: bool) -> None:
@@ -183,15 +182,3 @@ def _echo(trials: Table, document: Mapping[str, Any], *, as_json: bool) -> None:
         echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
     else:
         echo(to_text([trials, *([gain_table(document["gain"])] if document.get("gain") else [])]))
-
-
-def _said(options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
-    """What the user said about the log, as it is written down."""
-    return {
-        "topics": {role: list(names) for role, names in options.topics.items()},
-        "time": options.time.value,
-        "frame": options.frame,
-        "wrench_frame": options.wrench_frame,
-        "wrench": options.forces is not Forces.IGNORED,
-        "map": None if map_file is None else map_file.name,
-    }

@@ -1,15 +1,12 @@
 """``navirl fit``: demonstrations to a reward."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from math import isfinite, nan
 from pathlib import Path
 
 import click
-import numpy as np
 
-from navirl_cli.artefacts.rewards import Analyses, LearntReward, read_reward, read_reward_for, reward_document
-from navirl_cli.artefacts.store import Input, write_json
+from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
     Number,
@@ -26,22 +23,16 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.commands.usage import as_options
-from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.demos.timing import steps_in_contact
+from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
-from navirl_cli.errors import DemonstrationError, NavirlError, RewardError
-from navirl_cli.files import check_writable
-from navirl_cli.irl.bias import corrected
-from navirl_cli.irl.bootstrap import bootstrap as draw_again
-from navirl_cli.irl.evidence import Evidence, evidence_of
+from navirl_cli.errors import RewardError
+from navirl_cli.files import Input, check_writable
+from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.profile import number_of
-from navirl_cli.irl.profile import profile as follow_profile
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.status import Status
-from navirl_cli.irl.validation import cross_validate as leave_out
+from navirl_cli.irl.selection import Steps, select
 from navirl_cli.reports.fit import remarks, report, warnings
 
 
@@ -86,8 +77,8 @@ from navirl_cli.reports.fit import remarks, report, warnings
 @click.option("--only-corrected", is_flag=True, help="Learn from trials in which the person intervened only.")
 @click.option(
     "--steps",
-    type=click.Choice(["all", "contact"]),
-    default="all",
+    type=click.Choice([steps.value for steps in Steps]),
+    default=Steps.ALL.value,
     show_default=True,
     help="Learn from all steps of a path, or from those during contact only.",
 )
@@ -150,23 +141,25 @@ def fit(
             "leave out --prior, --steps, --bootstrap, --profile and --cross-validate"
         )
     start = _start(initial)
-    chosen, evidence = _evidence(_chosen(demos, conditions, cycle, only_corrected=only_corrected), steps)
-    resolution = _common_resolution(chosen)
+    selected = select(
+        demonstrations_in(demos),
+        conditions=conditions,
+        cycle=cycle,
+        only_corrected=only_corrected,
+        steps=Steps(steps),
+    )
+    chosen, evidence = selected.demonstrations, selected.evidence
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
     if earlier is not None and not initial:
         start = earlier.reward
-    # What would be refused after the fit is refused before it.
-    for name in profiles:
-        number_of(start, name)
-    for argument, wanted in (("bootstrap", bootstrap), ("cross_validate", cross_validate)):
-        if wanted:
-            evidence.several_people(argument)
-    found = _learn(evidence, start, earlier, l2, Method(method))
-    lost: list[str] = []
-    with _kept(lost):
-        found = corrected(evidence, found) if correct_bias else found
-    analyses = _analyses(evidence, found, bootstrap, profiles, seed, lost, held_out=bool(cross_validate))
-    document = reward_document(found, chosen, [Input.of(path) for path in files], resolution, analyses, steps)
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)
+    questions.check(evidence, start, Steps(steps), prior=earlier is not None)
+    found, analyses, lost = answers(
+        evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
+    )
+    document = reward_document(
+        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps
+    )
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
@@ -177,88 +170,17 @@ def fit(
     finish(lost)
 
 
-@contextmanager
-def _kept(lost: list[str]) -> Iterator[None]:
-    """Trouble with a question about a fit is no trouble with the fit: it is told at the end."""
-    try:
-        yield
-    except NavirlError as error:
-        lost.append(str(error))
-
-
 def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: float, method: Method) -> Fit:
     """The fit, with a bar."""
-    prior = None
-    if earlier is not None:
-        if earlier.status in {Status.STOPPED_EARLY, Status.INFINITE}:
-            raise RewardError(
-                f"--prior: that fit is not at its maximum ({earlier.status.value}), and no prior; fit it anew"
-            )
-        prior = Prior.gaussian(np.array(earlier.reward.theta), earlier.covariance)
     with progress_bar("fit") as update:
         return fit_reward(
             evidence,
             start,
             l2,
-            prior=prior,
+            prior=None if earlier is None else earlier.as_prior(),
             method=method,
             progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
         )
-
-
-def _chosen(
-    demos: Path, conditions: tuple[str, ...], cycle: int | None, *, only_corrected: bool
-) -> list[Demonstration]:
-    """The demonstrations of a file that are asked for."""
-    chosen = [
-        d
-        for d in demonstrations_in(demos)
-        if (not conditions or d.condition.value in conditions) and (cycle is None or d.cycle == cycle)
-    ]
-    unknown = [d.id for d in chosen if d.corrected is None]
-    if only_corrected and unknown:
-        raise DemonstrationError(
-            f"{demos}: --only-corrected: whether the person intervened is unknown of {', '.join(unknown)}, extracted "
-            "without a wrench; choose with --condition and --cycle"
-        )
-    return [d for d in chosen if d.corrected or not only_corrected]
-
-
-def _evidence(chosen: list[Demonstration], steps: str) -> tuple[list[Demonstration], Evidence]:
-    """The demonstrations and their steps to learn from."""
-    if steps == "all":
-        return chosen, evidence_of(chosen)
-    pushed = [(demonstration, steps_in_contact(demonstration)) for demonstration in chosen]
-    pushed = [(demonstration, mask) for demonstration, mask in pushed if mask.any()]
-    if chosen and not pushed:
-        raise DemonstrationError("--steps contact: in none of the demonstrations did the person push")
-    chosen = [demonstration for demonstration, _ in pushed]
-    return chosen, evidence_of(chosen).only([mask for _, mask in pushed])
-
-
-def _analyses(
-    evidence: Evidence,
-    found: Fit,
-    replicates: int | None,
-    names: Sequence[str],
-    seed: int,
-    lost: list[str],
-    *,
-    held_out: bool,
-) -> Analyses:
-    """What was asked for besides the fit; what cannot be said is added to ``lost``."""
-    drawn = validation = None
-    followed = []
-    if replicates:
-        with _kept(lost), progress_bar("bootstrap", replicates) as update:
-            drawn = draw_again(evidence, found, replicates, seed, progress=update)
-    for name in dict.fromkeys(names):
-        with _kept(lost), progress_bar("profile") as update:
-            followed.append(follow_profile(evidence, found, name, progress=update))
-    if held_out:
-        with _kept(lost), progress_bar("cross-validation", len(evidence.people)) as update:
-            validation = leave_out(evidence, found.initial, found.l2, progress=update)
-    return Analyses(drawn, tuple(followed), validation)
 
 
 def _start(initial: str) -> Reward:
@@ -281,14 +203,3 @@ def _start(initial: str) -> Reward:
         return Reward.named(values)
     except RewardError as error:
         raise click.BadParameter(as_options(str(error)), param_hint="--init") from None
-
-
-def _common_resolution(demonstrations: list[Demonstration]) -> float:
-    """The cells' side, on which the meaning of the parameters per step depends."""
-    sides = sorted({demonstration.grid.resolution_m for demonstration in demonstrations})
-    if len(sides) > 1:
-        raise DemonstrationError(
-            f"demonstrations on cells of {', '.join(f'{side:g}' for side in sides)} m cannot be learnt from together: "
-            "a reward per step depends on the step; extract them anew with one --resolution"
-        )
-    return sides[0]

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.artefacts.store import Input, read_json
+from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.shared import (
     FilePath,
     demonstrations_in,
@@ -19,7 +19,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.errors import ArtefactError
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.files import check_writable, replacing
+from navirl_cli.files import Input, check_writable, replacing
 
 
 @click.command()

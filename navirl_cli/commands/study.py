@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
-from navirl_cli.artefacts.store import Input, write_json
-from navirl_cli.commands.extraction import all_extracted
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     FilePath,
+    bytes_bar,
     demonstrations_in,
     echo,
     echo_json,
@@ -27,9 +27,10 @@ from navirl_cli.commands.shared import (
     topics_by_role,
 )
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.extract import Extraction, ExtractSettings, numbered
+from navirl_cli.demos.extract import Extraction, ExtractSettings
+from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.tables import written
-from navirl_cli.files import check_writable, new_folder, replacing
+from navirl_cli.files import Input, check_writable, new_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
@@ -141,21 +142,18 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
         demonstrations = demonstrations_in(logs[0])
         notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
         return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, [])
-    good, failed = all_extracted(logs, ExtractSettings(), options, join=False)
-    results = [result for _, result in good]
-    demonstrations = numbered(results)
+    with bytes_bar("extract") as update:
+        found = extract_recordings(logs, ExtractSettings(), options, progress=update)
+    results, demonstrations = found.extractions, found.demonstrations()
     return _Given(
         demonstrations,
         [one.log for one in results],
-        [file for files, _ in good for file in files],
+        list(found.inputs),
         _completion(results),
         [(f"{one.log}: {name}", same) for one in results for name, same in one.published.items()],
         {one.demonstrations[0].participant for one in results if one.published},
-        [
-            *(note for one in results for note in one.notes),
-            *(f"{one.id}: {note}" for one in demonstrations for note in one.notes),
-        ],
-        [*failed, *(line for one in results for line in (*one.damage, *one.skipped))],
+        found.notes(demonstrations),
+        found.lost,
     )
 
 

@@ -28,7 +28,12 @@ _MOST_TRIMS = 10
 
 @house_style()
 def new_figure(
-    width_in: float = COLUMN_IN, height_in: float | None = None, panels: int = 1, columns: int | None = None
+    width_in: float = COLUMN_IN,
+    height_in: float | None = None,
+    panels: int = 1,
+    columns: int | None = None,
+    *,
+    managed: bool = False,
 ) -> tuple[Figure, list[Axes]]:
     """Open a figure with panels side by side, or in rows.
 
@@ -37,6 +42,7 @@ def new_figure(
         height_in: Height, inches; None leaves as much as maps need, :func:`save_figure` takes away what is empty.
         panels: Number of panels.
         columns: Panels in a row, the last of which may be short of some; None puts all in one.
+        managed: Whether pyplot knows the figure, so that notebooks and ``matplotlib.pyplot.show()`` show it.
 
     Returns:
         The figure and its axes, row by row from left to right.
@@ -45,7 +51,12 @@ def new_figure(
     rows = ceil(panels / columns)
     height_in = rows * (width_in / columns * 1.3) + 1.0 if height_in is None else height_in
     layout = ConstrainedLayoutEngine(w_pad=PAD_IN, h_pad=PAD_IN, wspace=0.03, hspace=0.0)
-    figure = Figure(figsize=(width_in, height_in), layout=layout)
+    if managed:
+        from matplotlib import pyplot as plt
+
+        figure = plt.figure(figsize=(width_in, height_in), layout=layout)
+    else:
+        figure = Figure(figsize=(width_in, height_in), layout=layout)
     grid = figure.add_gridspec(rows, columns)
     return figure, [figure.add_subplot(grid[divmod(panel, columns)]) for panel in range(panels)]
 

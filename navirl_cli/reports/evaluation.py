@@ -1,35 +1,25 @@
 """What ``navirl evaluate`` prints and writes."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.store import Input, number
-from navirl_cli.documents.tables import Column, Format, Table, formatted, written
+from navirl_cli.artefacts.store import number
+from navirl_cli.documents.tables import Column, Format, Table, formatted
 from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric, Values
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
 Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
 #: More metrics stand below each other.
 MOST_COLUMNS = 6
-_PAGE = """# Metrics
-
-What `navirl evaluate --metrics NAME,NAME` measures, as `navirl evaluate --list-metrics` lists it. This page is written
-by `python -m navirl_cli.reports.evaluation > METRICS.md`.
-
-- Paths: metrics of *all* paths exist for driven, learnt, nominal and avoidance paths; those of *driven* paths only for
-  demonstrations as they were driven; those of *learnt* paths only beside a reward.
-- Needs: without it the value is missing, and the reason is given below the table and in the file.
-- Under a learnt policy these metrics have exact expected values: {exact}. The others are means over drawn paths.
-"""
 
 
 def metrics_table() -> Table:
@@ -37,12 +27,6 @@ def metrics_table() -> Table:
     columns = tuple(map(Column, ("name", "unit", "paths", "needs", "definition", "source")))
     rows = tuple((m.name, m.unit, m.paths, ", ".join(m.needs), m.definition, m.source) for m in METRICS)
     return Table(columns, rows)
-
-
-def metrics_page() -> str:
-    """The page METRICS.md."""
-    exact = ", ".join(f"`{metric.name}`" for metric in METRICS if metric.exact is not None)
-    return f"{_PAGE.format(exact=exact)}\n{written(metrics_table(), Format.MARKDOWN)}\n"
 
 
 def tables(result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Sequence[Metric], how: Format) -> str:
@@ -258,7 +242,3 @@ def _ranks_document(ranks: Sequence[Rank]) -> dict[str, Any]:
             for one in ranks
         ],
     }
-
-
-if __name__ == "__main__":
-    sys.stdout.write(metrics_page())

@@ -212,7 +212,7 @@ def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -
     return float(np.sqrt(np.mean(known**2))) if len(known) else nan
 
 
-def remarks(chosen: list[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
+def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
     """What a user may not have meant."""
     lines = []
     alone = sum(demonstration.corrected is False for demonstration in chosen)

@@ -1,0 +1,78 @@
+"""From what a user writes in Python to what the rooms take: checked as the options of the command line are."""
+
+from collections.abc import Collection, Mapping, Sequence
+from enum import StrEnum
+from math import isfinite
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+
+from navirl_cli.errors import ArgumentError
+
+Point: TypeAlias = tuple[float, float]
+Choice = TypeVar("Choice", bound=StrEnum)
+
+
+def texts(values: str | Collection[str]) -> tuple[str, ...]:
+    """One text or several."""
+    return (values,) if isinstance(values, str) else tuple(values)
+
+
+def one_of(names: Sequence[str], value: str, argument: str) -> str:
+    """A name among those that exist.
+
+    Raises:
+        ArgumentError: It is none of them.
+    """
+    if value not in names:
+        raise ArgumentError(f"`{argument}`: expected {' or '.join(names)}, found {value!r}")
+    return value
+
+
+def chosen(kind: type[Choice], value: str, argument: str) -> Choice:
+    """A choice by its value."""
+    return kind(one_of([one.value for one in kind], value, argument))
+
+
+def within(argument: str, value: float, low: float, high: float, *, above: bool = False) -> float:
+    """A finite number within bounds.
+
+    Raises:
+        ArgumentError: It is not.
+    """
+    if not (isfinite(value) and low <= value <= high and not (above and value == low)):
+        least = "above" if above else "from"
+        raise ArgumentError(f"`{argument}`: expected a number {least} {low:g} to {high:g}, found {value:g}")
+    return value
+
+
+def points_in(given: Point | Sequence[Point]) -> tuple[Point, ...]:
+    """One point or several.
+
+    Raises:
+        ArgumentError: A point is not two finite numbers.
+    """
+    several = np.asarray(given, dtype=float).reshape(-1, 2) if np.size(given) % 2 == 0 else np.full((1, 2), np.nan)
+    if not np.isfinite(several).all():
+        raise ArgumentError(f"expected points as (x, y) in m, found {given!r}")
+    return tuple((float(x), float(y)) for x, y in several)
+
+
+def topics_in(topic: Mapping[str, str | Sequence[str]] | None) -> dict[str, tuple[str, ...]]:
+    """Topics by role."""
+    return {role: texts(names) for role, names in (topic or {}).items()}
+
+
+def pairs_in(pair: tuple[str, str] | Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Pairs of names, of one pair or of several.
+
+    Raises:
+        ArgumentError: Something else was given.
+    """
+    several = [pair] if len(pair) == 2 and all(isinstance(one, str) for one in pair) else pair
+    found = []
+    for one in several:
+        if isinstance(one, str) or len(one) != 2:
+            raise ArgumentError(f"`pair`: expected two names of groups, found {one!r}")
+        found.append((str(one[0]), str(one[1])))
+    return found

@@ -1,0 +1,405 @@
+"""The functions of the door: each composes what a command of the same name does, with the same options."""
+
+import warnings
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, texts, topics_in, within
+from navirl_cli.api.given import (
+    AnyReward,
+    PathLike,
+    demonstrations_in,
+    files_behind,
+    learnt_in,
+    reward_in,
+    sources_behind,
+)
+from navirl_cli.api.results import Demonstrations, Evaluation, FittedReward, ScenePolicy
+from navirl_cli.artefacts.demonstrations import (
+    demonstrations_document,
+    demonstrations_of,
+    gain_document,
+    settings_document,
+)
+from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
+from navirl_cli.demos.contact import PushSettings
+from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.extract import ExtractSettings
+from navirl_cli.demos.rasterize import Rule
+from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.trials import Split
+from navirl_cli.errors import ArgumentError, NavirlWarning
+from navirl_cli.evaluation.compare import LEARNT, compare
+from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.groups import FIELDS
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
+from navirl_cli.evaluation.paired import pairs_of
+from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.files import Input
+from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.fit import PAPER_L2, Method
+from navirl_cli.irl.fit import fit as fit_reward
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import scenes_of
+from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.status import Status
+from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.logs.map_file import read_map
+from navirl_cli.logs.overview import Overview, overview
+from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.logs.sources import sources_of
+from navirl_cli.parallel import cores
+from navirl_cli.reports.evaluation import document as metrics_document
+from navirl_cli.reports.extraction import published_notes
+from navirl_cli.reports.fit import remarks
+from navirl_cli.reports.fit import warnings as fit_warnings
+
+
+def extract(
+    *logs: PathLike,
+    split: str = "goal",
+    participant: str | None = None,
+    robot_radius: float | None = None,
+    resolution: float = 0.1,
+    rasterizer: str = "study",
+    person: Point | Sequence[Point] = (),
+    goal: Point | None = None,
+    contact_force: float = 3.0,
+    wrench_filter: float = 5.0,
+    gain: bool = False,
+    topic: Mapping[str, str | Sequence[str]] | None = None,
+    map: PathLike | None = None,  # noqa: A002 the option's name
+    frame: str | None = None,
+    no_wrench: bool = False,
+    wrench_frame: str | None = None,
+    time: str = "header",
+    join: bool = False,
+    strict: bool = False,
+    executor: Executor | None = None,
+) -> Demonstrations:
+    """Turn MCAP logs into demonstrations, as ``navirl extract``.
+
+    What is damaged, skipped or left out is warned of (:class:`~navirl_cli.errors.NavirlWarning`) and listed in
+    ``lost``; what is odd is listed in ``notes``.
+
+    Args:
+        *logs: MCAP files, rosbag2 folders, folders of recordings, or patterns.
+        split: Trials begin at a new "goal", after a "stop", or the log is one trial ("none").
+        participant: Name in place of the log's or the file's.
+        robot_radius: m; grows the map. None: of the log's session record, else 0.3.
+        resolution: Side of the cells, m.
+        rasterizer: How a path becomes cells: "study", "crossed" or "chain".
+        person: Where a person stands, (x, y) m in the map frame, or several of them; in place of the log's people.
+        goal: (x, y) m in the map frame, in place of the log's goals.
+        contact_force: A contact begins above this force, N, and ends below half of it.
+        wrench_filter: The force is low-passed below this frequency, Hz.
+        gain: Estimate how fast the robot gives way to a push to the side.
+        topic: A topic, or several, by role, where several topics fit: ``{"wrench": "/ft"}``.
+        map: Map in place of the log's: a Nav2 map YAML beside its pgm or png.
+        frame: Frame of all results, in place of the map's.
+        no_wrench: Ignore forces, or do without them; contact is then unknown.
+        wrench_frame: Frame of the wrench, in place of its header's.
+        time: Time of a message: its "header" stamp, or its receipt ("log").
+        join: Take all logs as pieces of one recording.
+        strict: Refuse a log of which something is lost.
+        executor: Where to work on several logs; threads of this process by default. An executor of processes is
+            faster; create it under ``if __name__ == "__main__":``.
+
+    Returns:
+        The trials.
+
+    Raises:
+        NavirlError: No log gave a demonstration, or an argument cannot be right.
+
+    Example:
+        >>> demos = navirl.extract("p01.mcap", "p02.mcap")
+        >>> demos[0].id
+        'p01/1'
+    """
+    if not logs:
+        raise ArgumentError("`logs`: expected at least one log, found none")
+    if no_wrench and (gain or wrench_frame):
+        raise ArgumentError("`no_wrench` excludes `gain` and `wrench_frame`, which need the wrench")
+    settings = ExtractSettings(
+        split=chosen(Split, split, "split"),
+        resolution_m=within("resolution", resolution, 0.01, 2),
+        robot_radius_m=None if robot_radius is None else within("robot_radius", robot_radius, 0, 10),
+        rasterizer=chosen(Rule, rasterizer, "rasterizer"),
+        push=PushSettings(
+            begins_n=within("contact_force", contact_force, 0, 1000, above=True),
+            cutoff_hz=within("wrench_filter", wrench_filter, 0.01, 1000),
+        ),
+        participant=participant,
+        people_m=points_in(person) or None,
+        goal_m=None if goal is None else points_in(goal)[0],
+        gain=gain,
+    )
+    map_file = None if map is None else Path(map)
+    options = LoadOptions(
+        topics=topics_in(topic),
+        time=chosen(TimeSource, time, "time"),
+        frame=frame,
+        wrench_frame=wrench_frame,
+        occupancy=None if map_file is None else read_map(map_file),
+        forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
+        strict=strict,
+    )
+    with _workers(executor) as workers:
+        found = extract_recordings(logs, settings, options, join=join, executor=workers)
+    return _extracted(found, settings, options, map_file)
+
+
+def _extracted(
+    found: Recordings, settings: ExtractSettings, options: LoadOptions, map_file: Path | None
+) -> Demonstrations:
+    """What came out of logs, as its file would have it: numbers do not depend on whether trials went through a file."""
+    demonstrations = found.demonstrations()
+    inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
+    said = settings_document(settings, options, map_file)
+    _warn(found.lost, depth=4)
+    return Demonstrations(
+        demonstrations_of(demonstrations_document(demonstrations, inputs, said), "demonstrations"),
+        inputs=inputs,
+        settings=said,
+        notes=[*found.notes(demonstrations), *published_notes(found.extractions)],
+        lost=found.lost,
+        gain=gain_document([(one.log, one.gain) for one in found.extractions]) if settings.gain else None,
+    )
+
+
+def inspect(
+    *logs: PathLike, topic: Mapping[str, str | Sequence[str]] | None = None, check: bool = False
+) -> list[Overview]:
+    """What logs hold, and what :func:`extract` would take from them, as ``navirl inspect``.
+
+    Args:
+        *logs: As in :func:`extract`.
+        topic: As in :func:`extract`.
+        check: Read every message: damage inside of chunks shows only then.
+
+    Returns:
+        For each recording its topics, the choice for each role, clocks, frames and damage.
+
+    Raises:
+        NavirlError: An argument is no log, or a topic does not fit.
+
+    Example:
+        >>> navirl.inspect("p01.mcap")[0].needed
+        ()
+    """
+    if not logs:
+        raise ArgumentError("`logs`: expected at least one log, found none")
+    return [overview(source, topics_in(topic), check=check) for source in sources_of(logs)]
+
+
+def fit(
+    demos: PathLike | Sequence[Demonstration],
+    *,
+    init: PathLike | AnyReward | None = None,
+    prior: PathLike | LearntReward | None = None,
+    l2: float = PAPER_L2,
+    method: str = "newton",
+    condition: str | Collection[str] = (),
+    cycle: int | None = None,
+    only_corrected: bool = False,
+    steps: str = "all",
+    correct_bias: bool = False,
+    bootstrap: int | None = None,
+    profile: str | Sequence[str] = (),
+    cross_validate: str | None = None,
+    seed: int = 0,
+    executor: Executor | None = None,
+) -> FittedReward:
+    """Learn a navigation reward from demonstrations, as ``navirl fit``.
+
+    A fit that did not converge, and an analysis without an answer, are warned of
+    (:class:`~navirl_cli.errors.NavirlWarning`).
+
+    Args:
+        demos: Demonstrations, or their file.
+        init: Start: a reward, its file, or values by name.
+        prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init the start
+            too.
+        l2: Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, except those that the
+            prior knows. 0 for none.
+        method: "newton" (trust region, two starts) or the paper's gradient ascent, "adam".
+        condition: Learn from these conditions only: "force", "joystick", "autonomous"; one or several.
+        cycle: Learn from this cycle only.
+        only_corrected: Learn only from trials in which the person intervened.
+        steps: Learn from "all" steps of a path, or from those during "contact".
+        correct_bias: Subtract the first-order bias of maximum likelihood.
+        bootstrap: Fit this many times with participants drawn with replacement.
+        profile: Parameters whose profile likelihood is followed to its 95 % interval.
+        cross_validate: "participant": predict each participant from the others.
+        seed: Of the bootstrap.
+        executor: Where to compute bootstrap and cross-validation; threads of this process by default. An executor of
+            processes is faster; create it under ``if __name__ == "__main__":``.
+
+    Returns:
+        The reward with its covariance and its status.
+
+    Raises:
+        NavirlError: Nothing is left to learn from, the partition function is infinite at the start, or arguments
+            exclude each other.
+
+    Example:
+        >>> reward = navirl.fit(demos, condition="force", cycle=2)
+        >>> reward["c0"]  # per metre
+        -49.02...
+    """
+    demos = demonstrations_in(demos)
+    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    which = chosen(Steps, steps, "steps")
+    selected = select(demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=which)
+    earlier = None if prior is None else learnt_in(prior)
+    if earlier is not None:
+        check_cells(earlier, selected.demonstrations, "prior")
+    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
+    questions = Questions(
+        correct_bias,
+        None if bootstrap is None else int(within("bootstrap", bootstrap, 2, 100_000)),
+        texts(profile),
+        cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
+        seed,
+    )
+    questions.check(selected.evidence, start, which, prior=earlier is not None)
+    found = fit_reward(
+        selected.evidence,
+        start,
+        within("l2", l2, 0, 1e6),
+        prior=None if earlier is None else earlier.as_prior(),
+        method=chosen(Method, method, "method"),
+    )
+    with _workers(executor) as workers:
+        found, analyses, lost = answers(selected.evidence, found, questions, executor=workers)
+    inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
+    document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
+    notes = (*remarks(selected.demonstrations, earlier, chosen_by=conditions), *fit_warnings(document))
+    ended = [] if found.status is Status.CONVERGED else [f"fit: {found.status.value}: {found.status.advice}"]
+    _warn([*ended, *lost])
+    return FittedReward.of(
+        learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses
+    )
+
+
+def evaluate(
+    demos: PathLike | Sequence[Demonstration],
+    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
+    *,
+    metrics: str | Sequence[str] = (),
+    by: str | Collection[str] = (),
+    pair: tuple[str, str] | Sequence[tuple[str, str]] = (),
+    ranks: bool = False,
+    samples: int = 1000,
+    precision: float | None = None,
+    seed: int = 0,
+) -> Evaluation:
+    """Measure demonstrated, learnt and baseline paths, as ``navirl evaluate``.
+
+    Args:
+        demos: Demonstrations, or their file.
+        reward: A reward, its file, values by name of parameter; or several rewards by names of their own.
+        metrics: Names of metrics, or "all"; the paper's three by default.
+        by: Group by these: "condition", "cycle", "set", "participant"; by the first three by default.
+        pair: Two groups whose driven paths are compared by participant, or several such pairs.
+        ranks: Rank demonstrations among the policy's paths.
+        samples: Paths drawn from a policy in each scene.
+        precision: Draw until the Monte Carlo error of each expected value is below this share of it, or of its spread.
+        seed: Of everything drawn by chance.
+
+    Returns:
+        Metrics by group; print them, write them, or take :meth:`~navirl_cli.api.results.Evaluation.to_frame`.
+
+    Raises:
+        NavirlError: A metric or a group is unknown, or a reward has no policy in a scene.
+
+    Example:
+        >>> navirl.evaluate(demos, reward).to_frame()[["group", "paths", "length_m_mean"]]
+    """
+    demos = demonstrations_in(demos)
+    rewards = _rewards(reward, demos)
+    if ranks and len(rewards) != 1:
+        raise ArgumentError("`ranks` needs one `reward`")
+    measured = _metrics(metrics)
+    fields = tuple(one_of(tuple(FIELDS), one, "by") for one in texts(by))
+    drawing = Precision(
+        int(within("samples", samples, 2, MOST)),
+        None if precision is None else within("precision", precision, 1e-3, 1),
+    )
+    rng = np.random.default_rng(seed)
+    learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
+    result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
+    compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in pairs_in(pair)]
+    ranked = ranks_of(demos, next(iter(learnt.values())), drawing.samples, rng) if ranks else []
+    inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
+    document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
+    _warn(result.notes)
+    return Evaluation(result, measured, compared, ranked, document)
+
+
+def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> ScenePolicy:
+    """The policy of a reward in the scene of a demonstration.
+
+    Args:
+        reward: A reward, its file, or values by name of parameter.
+        demonstration: Gives the map, the people, the start and the goal.
+
+    Returns:
+        Expected visits, soft value, reward and probabilities as arrays over the map, and paths to draw.
+
+    Raises:
+        NavirlError: The scene has no path to the goal, the partition function is infinite, or the reward was learnt on
+            cells of another size.
+
+    Example:
+        >>> where = navirl.policy(reward, demos[0])
+        >>> where.visits.shape == where.grid.shape
+        True
+    """
+    learnt = reward_in(reward, [demonstration])
+    scene = scenes_of([demonstration])[0]
+    return ScenePolicy(demonstration, learnt, scene, policy_of(learnt, scene))
+
+
+def _warn(lines: Sequence[str], depth: int = 3) -> None:
+    """Warn of what is lost, at the line of the user's call, which is so many calls up."""
+    for line in lines:
+        warnings.warn(line, NavirlWarning, stacklevel=depth)
+
+
+@contextmanager
+def _workers(executor: Executor | None) -> Iterator[Executor]:
+    """Where to work. Processes would start the user's own script again where they cannot fork."""
+    if executor is not None:
+        yield executor
+        return
+    with ThreadPoolExecutor(cores()) as own:
+        yield own
+
+
+def _rewards(
+    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None, demos: Sequence[Demonstration]
+) -> dict[str, Reward | LearntReward]:
+    """Rewards by name; one alone is named "learnt"."""
+    if reward is None:
+        return {}
+    several = isinstance(reward, Mapping) and not all(isinstance(value, int | float) for value in reward.values())
+    named: Mapping[str, Any] = reward if several else {LEARNT: reward}  # type: ignore[assignment]
+    for one in named.values():
+        reward_in(one, demos)
+    files = str | Path | LearntReward
+    return {name: learnt_in(one) if isinstance(one, files) else reward_in(one) for name, one in named.items()}
+
+
+def _metrics(names: str | Sequence[str]) -> tuple[Metric, ...]:
+    """Metrics by name."""
+    if names == "all":
+        return tuple(BY_NAME.values())
+    known = tuple(BY_NAME)
+    return tuple(BY_NAME[one_of(known, name, "metrics")] for name in dict.fromkeys(texts(names))) or PAPER_METRICS

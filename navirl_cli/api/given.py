@@ -1,0 +1,111 @@
+"""What a user gives: demonstrations and rewards as they are, or the files that hold them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from navirl_cli.api.results import Demonstrations, FittedReward
+from navirl_cli.artefacts.demonstrations import demonstrations_of
+from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of
+from navirl_cli.artefacts.store import read_json
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.files import Input
+from navirl_cli.irl.reward import Reward
+from navirl_cli.reports.fit import warnings
+
+PathLike: TypeAlias = str | Path
+#: A learnt reward, or values by the names of the parameters; what is not named keeps its initial value.
+AnyReward: TypeAlias = LearntReward | Reward | Mapping[str, float]
+
+
+def read_demonstrations(path: PathLike) -> Demonstrations:
+    """Read a demonstrations file.
+
+    Args:
+        path: As written by ``navirl extract`` or :meth:`Demonstrations.write`.
+
+    Returns:
+        The trials.
+
+    Raises:
+        NavirlError: The file is missing, or is no demonstrations file, or holds none.
+    """
+    path = Path(path)
+    document = read_json(path, "demonstrations")
+    trials = demonstrations_of(document, str(path))
+    if not trials:
+        raise DemonstrationError(f"{path}: holds no demonstrations")
+    return Demonstrations(
+        trials,
+        inputs=[Input(**one) for one in document["inputs"]],
+        settings=document["settings"],
+        notes=[f"{one.id}: {note}" for one in trials for note in one.notes],
+        gain=document.get("gain"),
+        file=Input.of(path),
+    )
+
+
+def read_reward(path: PathLike) -> FittedReward:
+    """Read a reward file.
+
+    Args:
+        path: As written by ``navirl fit`` or :meth:`FittedReward.write`.
+
+    Returns:
+        The reward.
+
+    Raises:
+        NavirlError: The file is missing, or is no reward file.
+    """
+    path = Path(path)
+    document = read_json(path, "reward")
+    content = {key: value for key, value in document.items() if key not in {"format", "version", "navirl"}}
+    return FittedReward.of(learnt_of(document, str(path)), content, notes=tuple(warnings(content)), file=Input.of(path))
+
+
+def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Demonstration]:
+    """Demonstrations, read where a file is named.
+
+    Raises:
+        DemonstrationError: There is none.
+    """
+    if isinstance(demos, str | Path):
+        return read_demonstrations(demos)
+    if not demos:
+        raise DemonstrationError("`demos`: expected at least one demonstration, found none")
+    return demos
+
+
+def sources_behind(demos: Sequence[Demonstration]) -> Sequence[Input]:
+    """The files behind demonstrations, where they are known."""
+    return demos.sources() if isinstance(demos, Demonstrations) else ()
+
+
+def files_behind(reward: object) -> list[Input]:
+    """The file of a reward, where there is one."""
+    if isinstance(reward, str | Path):
+        return [Input.of(Path(reward))]
+    file = reward.file if isinstance(reward, FittedReward) else None
+    return [] if file is None else [file]
+
+
+def learnt_in(reward: PathLike | LearntReward) -> LearntReward:
+    """A learnt reward, read where a file is named."""
+    return read_reward(reward) if isinstance(reward, str | Path) else reward
+
+
+def reward_in(reward: PathLike | AnyReward, demonstrations: Sequence[Demonstration] = ()) -> Reward:
+    """The reward, checked against the cells of the demonstrations on which it is used.
+
+    Raises:
+        ArtefactError: It was learnt on cells of another size.
+        RewardError: A parameter is unknown or out of its bounds.
+    """
+    if isinstance(reward, Reward):
+        return reward
+    if isinstance(reward, Mapping):
+        return Reward.named(reward)
+    learnt = learnt_in(reward)
+    check_cells(learnt, demonstrations, str(reward) if isinstance(reward, str | Path) else "reward")
+    return learnt.reward

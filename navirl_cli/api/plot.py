@@ -1,0 +1,380 @@
+"""Figures, as ``navirl plot`` draws them: on axes of yours, or on a new figure.
+
+Every function draws in the style of the command line and returns the axes. Without ``axes`` it opens a figure through
+pyplot: a notebook shows it at the end of the cell, ``matplotlib.pyplot.show()`` in a window. With ``output`` it writes
+the figure to that file and shows nothing. All functions take the options of :class:`PageOptions`.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict, Unpack
+
+import numpy as np
+
+from navirl_cli.api.arguments import one_of, texts, within
+from navirl_cli.api.calls import policy as policy_in
+from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, reward_in
+from navirl_cli.api.results import ScenePolicy
+from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import ArgumentError, ArtefactError
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
+from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import by_group, group_of
+from navirl_cli.evaluation.metrics import PAPER_METRICS
+from navirl_cli.evaluation.ranks import ranks_of, uniformity
+from navirl_cli.figures.actions import draw_actions
+from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
+from navirl_cli.figures.forces import draw_forces
+from navirl_cli.figures.overlay import Overlay, alike
+from navirl_cli.figures.paths import draw_paths
+from navirl_cli.figures.profile import ASPECT, draw_profile
+from navirl_cli.figures.properties import bars_of, draw_properties, height_for
+from navirl_cli.figures.ranks import draw_ranks
+from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
+from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
+from navirl_cli.figures.values import draw_value
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["actions", "convergence", "forces", "paths", "policy", "profile", "properties", "ranks", "reward", "value"]
+
+
+class PageOptions(TypedDict, total=False):
+    """Options of every figure."""
+
+    #: As wide as a page of two columns (7.16 in), not one (3.5 in).
+    wide: bool
+    #: "paper", "screen" (twice the pixels) or "dark".
+    style: str
+    #: File to write: .png, .pdf or .svg, with embedded fonts; nothing is shown then.
+    output: PathLike | None
+    #: Replace an existing file.
+    force: bool
+
+
+def paths(
+    demos: PathLike | Sequence[Demonstration],
+    *,
+    axes: "Axes | None" = None,
+    crop: bool = False,
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
+
+    Args:
+        demos: Demonstrations, or their file.
+        axes: Where to draw; a new figure by default.
+        crop: Show no more of the map than what surrounds the paths.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        NavirlError: There is no demonstration, or the figure cannot be written.
+    """
+    demonstrations = demonstrations_in(demos)
+    return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
+
+
+def policy(
+    reward: PathLike | AnyReward,
+    demonstration: Demonstration,
+    *,
+    axes: "Axes | None" = None,
+    crop: bool = False,
+    overlay: str | Collection[str] = (),
+    samples: int = 20,
+    seed: int = 0,
+    demos: Sequence[Demonstration] = (),
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw where a policy leads: expected visits of every cell (the paper's Fig. 8, left).
+
+    Args:
+        reward: A reward, its file, or values by name of parameter.
+        demonstration: Gives the map, the people, the start and the goal.
+        axes: Where to draw; a new figure by default.
+        crop: Show no more of the map than what surrounds the likely paths.
+        overlay: Draw paths over the map: "demos", "samples", or both.
+        samples: Number of paths that are drawn from the policy.
+        seed: The same seed gives the same paths.
+        demos: Demonstrations for the overlay, of which those in the same scene are drawn; the demonstration alone by
+            default.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        NavirlError: The scene has no policy under the reward, or the figure cannot be written.
+    """
+    view = policy_in(reward, demonstration)
+    options = _cells(view, crop, overlay, samples, seed, demos)
+    return _drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), _own(axes), page)[
+        0
+    ]
+
+
+def reward(
+    reward: PathLike | AnyReward,
+    demonstration: Demonstration,
+    *,
+    axes: "Axes | None" = None,
+    crop: bool = False,
+    overlay: str | Collection[str] = (),
+    samples: int = 20,
+    seed: int = 0,
+    demos: Sequence[Demonstration] = (),
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
+    view = policy_in(reward, demonstration)
+    options = _cells(view, crop, overlay, samples, seed, demos)
+    by_cell = view.reward.by_cell(view.scene)
+    return _drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), _own(axes), page)[0]
+
+
+def value(
+    reward: PathLike | AnyReward,
+    demonstration: Demonstration,
+    *,
+    axes: "Axes | None" = None,
+    crop: bool = False,
+    overlay: str | Collection[str] = (),
+    samples: int = 20,
+    seed: int = 0,
+    demos: Sequence[Demonstration] = (),
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
+    view = policy_in(reward, demonstration)
+    options = _cells(view, crop, overlay, samples, seed, demos)
+    return _drawn(lambda panels: draw_value(panels[0], view.scene, view.policy.value, **options), _own(axes), page)[0]
+
+
+def actions(
+    reward: PathLike | AnyReward,
+    demonstration: Demonstration,
+    *,
+    axes: "Axes | None" = None,
+    crop: bool = False,
+    overlay: str | Collection[str] = (),
+    samples: int = 20,
+    seed: int = 0,
+    demos: Sequence[Demonstration] = (),
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
+    view = policy_in(reward, demonstration)
+    options = _cells(view, crop, overlay, samples, seed, demos)
+    return _drawn(
+        lambda panels: draw_actions(panels[0], view.scene, view.policy.probability, **options), _own(axes), page
+    )[0]
+
+
+def properties(
+    demos: PathLike | Sequence[Demonstration],
+    reward: PathLike | AnyReward | None = None,
+    *,
+    samples: int = 100,
+    seed: int = 0,
+    **page: Unpack[PageOptions],
+) -> "list[Axes]":
+    """Draw length, distance and area of paths by condition, as bars (the paper's Fig. 7).
+
+    Args:
+        demos: Demonstrations, or their file.
+        reward: Adds bars of the learnt paths, in the groups that it was learnt from, or in all if that is not known.
+        samples: Paths drawn from the policy in each scene.
+        seed: The same seed gives the same paths.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes of the three panels.
+
+    Raises:
+        NavirlError: There is no demonstration, or the figure cannot be written.
+    """
+    demonstrations = demonstrations_in(demos)
+    learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
+    drawing = Precision(int(within("samples", samples, 2, 100_000)))
+    result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
+    shown = _taught(reward, demonstrations)
+    bars = bars_of(
+        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in shown)
+    )
+    panels = len(PAPER_METRICS)
+    height_in = height_for(bars, _width_in(page))
+    return _drawn(lambda axes: draw_properties(axes, bars), None, page, panels=panels, height_in=height_in)
+
+
+def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
+    """Draw how the person pushed in a trial: forces over time with contacts, and as arrows along the path.
+
+    Args:
+        demonstration: The trial.
+        crop: Show no more of the map than what surrounds the path.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes of both panels.
+
+    Raises:
+        NavirlError: The trial has no wrench, or the figure cannot be written.
+    """
+    return _drawn(lambda axes: draw_forces(axes, demonstration, crop=crop), None, page, panels=2, columns=1)
+
+
+def ranks(
+    demos: PathLike | Sequence[Demonstration],
+    reward: PathLike | AnyReward,
+    *,
+    axes: "Axes | None" = None,
+    samples: int = 1000,
+    seed: int = 0,
+    **page: Unpack[PageOptions],
+) -> "Axes":
+    """Draw the ranks of demonstrations among the policy's own paths: uniform where the policy is right.
+
+    Args:
+        demos: Demonstrations, or their file.
+        reward: A reward, its file, or values by name of parameter.
+        axes: Where to draw; a new figure by default.
+        samples: Paths drawn from the policy in each scene.
+        seed: The same seed gives the same paths.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        NavirlError: A scene has no policy under the reward, or the figure cannot be written.
+    """
+    demonstrations = demonstrations_in(demos)
+    found = ranks_of(demonstrations, reward_in(reward, demonstrations), samples, np.random.default_rng(seed))
+    shares = np.array([one.rank for one in found])
+    return _drawn(lambda panels: draw_ranks(panels[0], shares, uniformity(found)[1]), _own(axes), page)[0]
+
+
+def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) -> "list[Axes]":
+    """Draw how a fit came to its maximum: log-likelihood and parameters over the iterations.
+
+    Args:
+        reward: A learnt reward, or its file.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes of the panels.
+
+    Raises:
+        NavirlError: The reward holds no iterations, or the figure cannot be written.
+    """
+    learnt = learnt_in(reward)
+    search, parameters = learnt.search, learnt.reward.parameters
+    if search is None:
+        raise ArtefactError("reward: expected the iterations of its fit, found none; fit it again")
+    panels, columns = 1 + len(parameters), columns_for(_width_in(page))
+    return _drawn(
+        lambda axes: draw_convergence(axes, search.log_likelihood, search.theta, parameters),
+        None,
+        page,
+        panels=panels,
+        columns=columns,
+        height_in=ceil(panels / columns) * ROW_IN,
+    )
+
+
+def profile(
+    reward: PathLike | LearntReward, name: str, *, axes: "Axes | None" = None, **page: Unpack[PageOptions]
+) -> "Axes":
+    """Draw the profile likelihood of a parameter with its interval.
+
+    Args:
+        reward: A reward that was learnt with ``profile=NAME``, or its file.
+        name: The parameter.
+        axes: Where to draw; a new figure by default.
+        **page: As in :class:`PageOptions`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        NavirlError: The reward holds no profile of the parameter, or the figure cannot be written.
+    """
+    learnt = learnt_in(reward)
+    found = next((one for one in learnt.profiles if one.name == name), None)
+    if found is None:
+        known = ", ".join(one.name for one in learnt.profiles) or "none"
+        raise ArgumentError(f"expected a parameter whose profile was followed ({known}), found {name!r}; use `profile`")
+    unit = next(parameter.unit for parameter in learnt.reward.parameters if parameter.name == name)
+    height_in = _width_in(page) * ASPECT
+    return _drawn(lambda panels: draw_profile(panels[0], found, unit), _own(axes), page, height_in=height_in)[0]
+
+
+def _own(axes: "Axes | None") -> "list[Axes] | None":
+    return None if axes is None else [axes]
+
+
+def _width_in(page: PageOptions) -> float:
+    """Width of one column or of a page of two, inches."""
+    return PAGE_IN if page.get("wide") else COLUMN_IN
+
+
+def _drawn(
+    draw: Callable[["list[Axes]"], object],
+    axes: "list[Axes] | None",
+    page: PageOptions,
+    *,
+    panels: int = 1,
+    columns: int | None = None,
+    height_in: float | None = None,
+) -> "list[Axes]":
+    """Draw on given axes, or on a new figure that is shown or written."""
+    output, style = page.get("output"), one_of(tuple(LOOKS), page.get("style", "paper"), "style")
+    if axes is not None and output is not None:
+        raise ArgumentError("`output` is for new figures: save the figure of your `axes` yourself")
+    if output is not None:
+        check_target(Path(output), force=page.get("force", False))
+    with styled(style):
+        if axes is not None:
+            draw(axes)
+            return axes
+        figure, axes = new_figure(_width_in(page), height_in, panels, columns, managed=output is None)
+        draw(axes)
+        if height_in is None:
+            trim_height(figure)
+        if output is not None:
+            save_figure(figure, Path(output), force=page.get("force", False), trim=False)
+    return axes
+
+
+def _cells(
+    view: ScenePolicy,
+    crop: bool,
+    overlay: str | Collection[str],
+    samples: int,
+    seed: int,
+    demos: Sequence[Demonstration],
+) -> CellOptions:
+    """What all figures of a scene share; a cropped one shows the same window in all of them."""
+    wanted = {one_of(("demos", "samples"), one, "overlay") for one in texts(overlay)}
+    overlays = []
+    if "demos" in wanted:
+        groups = by_group(alike(demos or [view.demonstration], view.demonstration))
+        overlays += [Overlay(group, group, [one.xy_m for one in own]) for group, own in groups.items()]
+    if "samples" in wanted:
+        overlays.append(Overlay("drawn from the policy", LEARNT, view.sample(samples, seed=seed)))
+    lines = [line for one in overlays for line in one.lines_m]
+    window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
+    return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}
+
+
+def _taught(reward: PathLike | AnyReward | None, demonstrations: Sequence[Demonstration]) -> set[str]:
+    """Groups that a reward was learnt from; all where that is not known."""
+    learnt = learnt_in(reward) if isinstance(reward, str | Path | LearntReward) else None
+    return {group_of(one) for one in demonstrations if learnt is None or one.id in learnt.demonstrations}

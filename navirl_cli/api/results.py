@@ -1,0 +1,357 @@
+"""What the door returns: tables and arrays that can be printed, written, and handed to pandas."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from navirl_cli.arrays import FloatArray
+from navirl_cli.artefacts.demonstrations import demonstrations_document
+from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.artefacts.store import write_json
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.grid import Grid
+from navirl_cli.documents.tables import ENDINGS, Format
+from navirl_cli.documents.text import to_text
+from navirl_cli.errors import ArgumentError, MissingPackageError
+from navirl_cli.evaluation.compare import Comparison
+from navirl_cli.evaluation.metrics import Metric
+from navirl_cli.evaluation.paired import Paired
+from navirl_cli.evaluation.ranks import Rank
+from navirl_cli.files import Input, check_writable, replacing
+from navirl_cli.irl.analyses import Analyses
+from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.paths import sample_paths, sampled_lines_m
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scene import Scene
+from navirl_cli.irl.values import Policy
+from navirl_cli.reports.evaluation import tables
+from navirl_cli.reports.extraction import trial_table
+from navirl_cli.reports.fit import report
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def frame_of(records: Sequence[Mapping[str, Any]]) -> "DataFrame":
+    """Rows as a pandas DataFrame.
+
+    Raises:
+        MissingPackageError: pandas is not installed.
+    """
+    try:
+        from pandas import DataFrame
+    except ImportError as error:
+        raise MissingPackageError("to_frame needs pandas, found none; install it with: pip install pandas") from error
+    return DataFrame.from_records([dict(record) for record in records])
+
+
+class Demonstrations(Sequence[Demonstration]):
+    """Trials, in order: a sequence of :class:`~navirl_cli.demos.demonstration.Demonstration`.
+
+    A slice has the same sources; any other choice (a list, say) serves as well wherever demonstrations are asked for.
+
+    Attributes:
+        inputs: Name and SHA-256 of the files that the trials were made from.
+        settings: The choices of the extraction.
+        notes: What a reader of the results should know, one text a fact.
+        lost: What was damaged, skipped or left out.
+        gain: How fast the robot gives way to a push, as in demos.json; None where it was not asked for.
+    """
+
+    def __init__(
+        self,
+        trials: Iterable[Demonstration],
+        *,
+        inputs: Iterable[Input] = (),
+        settings: Mapping[str, Any] | None = None,
+        notes: Iterable[str] = (),
+        lost: Iterable[str] = (),
+        gain: Mapping[str, Any] | None = None,
+        file: Input | None = None,
+    ) -> None:
+        self._trials = tuple(trials)
+        self.inputs, self.settings = tuple(inputs), dict(settings or {})
+        self.notes, self.lost, self.gain = tuple(notes), tuple(lost), gain
+        self._file = file
+
+    def __len__(self) -> int:
+        """Number of trials."""
+        return len(self._trials)
+
+    @overload
+    def __getitem__(self, index: int) -> Demonstration: ...
+    @overload
+    def __getitem__(self, index: slice) -> "Demonstrations": ...
+    def __getitem__(self, index: int | slice) -> "Demonstration | Demonstrations":
+        """A trial, or several."""
+        if isinstance(index, int):
+            return self._trials[index]
+        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
+        return Demonstrations(self._trials[index], notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
+
+    def __repr__(self) -> str:
+        """The table of trials."""
+        return to_text([trial_table(self)])
+
+    def sources(self) -> tuple[Input, ...]:
+        """The file that the trials were read from, or the logs that they were extracted from."""
+        return self.inputs if self._file is None else (self._file,)
+
+    def to_frame(self) -> "DataFrame":
+        """The table of trials, a row a trial; missing values are None or NaN.
+
+        Returns:
+            A pandas DataFrame.
+
+        Raises:
+            NavirlError: pandas is not installed.
+        """
+        return frame_of(trial_table(self).records())
+
+    def write(self, path: str | Path, *, force: bool = False) -> None:
+        """Write a demonstrations file, as ``navirl extract -o``.
+
+        Args:
+            path: File to write.
+            force: Replace an existing file.
+
+        Raises:
+            NavirlError: The file cannot be written.
+        """
+        document = demonstrations_document(self, self.inputs, self.settings)
+        if self.gain is not None:
+            document["gain"] = dict(self.gain)
+        write_json(Path(path), "demonstrations", document, force=force)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedReward(LearntReward):
+    """A learnt reward, with everything that its file holds.
+
+    Beside the attributes of :class:`~navirl_cli.artefacts.rewards.LearntReward`:
+
+    Attributes:
+        document: The content of the reward file.
+        notes: What a reader of the numbers should know, one text a fact.
+        lost: Analyses that were asked for and have no answer, with the reason.
+        fit: The fit itself; None of a reward that was read from a file.
+        analyses: Answers to what was asked besides; None of a reward that was read from a file.
+        file: Name and SHA-256 of the file; None of a reward that was not read.
+    """
+
+    document: Mapping[str, Any] | None = None
+    notes: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
+    fit: Fit | None = None
+    analyses: Analyses | None = None
+    file: Input | None = None
+
+    @staticmethod
+    def of(learnt: LearntReward, document: Mapping[str, Any], **more: Any) -> "FittedReward":
+        """A learnt reward with the content of its file."""
+        known = {field.name: getattr(learnt, field.name) for field in fields(LearntReward)}
+        return FittedReward(**known, document=document, **more)
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a parameter, in its unit.
+
+        Raises:
+            ArgumentError: The reward has no such parameter.
+        """
+        values = {
+            parameter.name: value for parameter, value in zip(self.reward.parameters, self.reward.theta, strict=True)
+        }
+        if name not in values:
+            raise ArgumentError(f"expected a parameter of {', '.join(values)}, found {name!r}")
+        return values[name]
+
+    def __repr__(self) -> str:
+        """The parameters and how the fit ended, as ``navirl fit`` prints them."""
+        return "\n".join((to_text(report(self.document or {})), *(f"note: {line}" for line in self.notes)))
+
+    def _parameters(self) -> list[dict[str, Any]]:
+        """The parameters as in the file."""
+        return list((self.document or {"parameters": []})["parameters"])
+
+    def to_frame(self) -> "DataFrame":
+        """The parameters, a row each: name, unit, value, standard errors, whether the data identify it.
+
+        Returns:
+            A pandas DataFrame.
+
+        Raises:
+            NavirlError: pandas is not installed.
+        """
+        return frame_of(self._parameters())
+
+    def write(self, path: str | Path, *, force: bool = False) -> None:
+        """Write a reward file, as ``navirl fit -o``.
+
+        Args:
+            path: File to write.
+            force: Replace an existing file.
+
+        Raises:
+            NavirlError: The file cannot be written.
+        """
+        write_json(Path(path), "reward", self.document or {}, force=force)
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePolicy:
+    """The policy of a reward in the scene of one demonstration, as arrays over the map.
+
+    Attributes:
+        demonstration: The trial whose map, people, start and goal make the scene.
+        reward: The reward.
+        scene: The states, start, goal, people and nominal path.
+        policy: Values and probabilities by state, and the means to solve for visits.
+    """
+
+    demonstration: Demonstration
+    reward: Reward
+    scene: Scene
+    policy: Policy
+
+    @property
+    def grid(self) -> Grid:
+        """The map: resolution_m, origin_m, extent_m, and which cells are occupied."""
+        return self.scene.lattice.grid
+
+    @cached_property
+    def visits(self) -> FloatArray:
+        """(rows, columns) expected visits of every cell by a path from the start; NaN where the robot cannot be."""
+        return self._over_map(self.visits_by_state)
+
+    @cached_property
+    def visits_by_state(self) -> FloatArray:
+        """(n,) the same by state."""
+        return self.policy.visits_from(self.scene.start)
+
+    @cached_property
+    def value(self) -> FloatArray:
+        """(rows, columns) soft value: log of the partition function of the paths to the goal; NaN as in visits."""
+        return self._over_map(self.policy.value)
+
+    @cached_property
+    def state_reward(self) -> FloatArray:
+        """(rows, columns) reward of a step without the cost of its length, dimensionless; NaN as in visits."""
+        return self._over_map(self.reward.by_cell(self.scene))
+
+    @cached_property
+    def probability(self) -> FloatArray:
+        """(rows, columns, 8) probability of each move, ordered as navirl_cli.demos.grid.MOVES; NaN as in visits."""
+        return self._over_map(self.policy.probability)
+
+    def sample(self, count: int = 20, *, seed: int = 0) -> list[FloatArray]:
+        """Draw paths from start to goal.
+
+        Args:
+            count: Number of paths.
+            seed: The same seed gives the same paths.
+
+        Returns:
+            For each path (k, 2) x and y of the centres of its cells, m, map frame.
+        """
+        paths = sample_paths(self.policy, self.scene.start, count, np.random.default_rng(seed))
+        return sampled_lines_m(self.policy, paths)
+
+    def _over_map(self, by_state: FloatArray) -> FloatArray:
+        """Values by state, (n, ...), over the map, (rows, columns, ...)."""
+        over = np.full((*self.grid.shape, *by_state.shape[1:]), np.nan)
+        columns, rows = self.scene.lattice.cells.T
+        over[rows, columns] = by_state
+        return over
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of a metrics file with one value a column: those by metric as METRIC_NAME, measured ones as METRIC."""
+    columns: dict[str, Any] = {}
+    for key, value in row.items():
+        if isinstance(value, Mapping):
+            columns |= {name if key == "metrics" else f"{name}_{key}": one for name, one in value.items()}
+        else:
+            columns[key] = value
+    return columns
+
+
+#: Tables of an evaluation.
+TABLES = ("groups", "demonstrations", "pairs", "ranks")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation:
+    """Metrics of demonstrated, learnt and baseline paths.
+
+    Attributes:
+        comparison: Mean and spread by group and type of path; every demonstration as driven.
+        metrics: The metrics that were asked for.
+        pairs: Groups compared by participant.
+        ranks: Ranks of the demonstrations among the policy's paths.
+        document: The content of a metrics file.
+    """
+
+    comparison: Comparison
+    metrics: tuple[Metric, ...]
+    pairs: Sequence[tuple[str, str, Mapping[str, Paired]]]
+    ranks: Sequence[Rank]
+    document: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        """The tables, as ``navirl evaluate`` prints them."""
+        return self._written(Format.TEXT)
+
+    def _written(self, how: Format) -> str:
+        return tables(self.comparison, self.pairs, self.ranks, self.metrics, how)
+
+    def to_frame(self, table: str = "groups") -> "DataFrame":
+        """One of the tables.
+
+        Args:
+            table: "groups": a row for each group and type of path, with the columns METRIC_mean and
+                METRIC_standard_deviation;
+                "demonstrations": a row for each demonstration as driven, a column a metric;
+                "pairs": a row for each pair and metric; "ranks": a row for each ranked demonstration.
+
+        Returns:
+            A pandas DataFrame in the units of the metrics' names.
+
+        Raises:
+            NavirlError: pandas is not installed, or there is no such table.
+        """
+        if table not in TABLES:
+            raise ArgumentError(f"`table`: expected one of {', '.join(TABLES)}, found {table!r}")
+        rows: Any = self.document[table] or []
+        if table == "ranks":
+            rows = rows["demonstrations"] if rows else []
+        if table == "pairs":
+            rows = [
+                {key: value for key, value in row.items() if key != "metrics"} | {"metric": name} | numbers
+                for row in rows
+                for name, numbers in row["metrics"].items()
+            ]
+        return frame_of([_flat(row) for row in rows])
+
+    def write(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the results, as ``navirl evaluate -o``: .json, .csv, .md or .tex.
+
+        Args:
+            path: File to write.
+            force: Replace an existing file.
+
+        Raises:
+            NavirlError: The ending is unknown, or the file cannot be written.
+        """
+        output = Path(path)
+        if output.suffix not in ENDINGS:
+            raise ArgumentError(f"{output}: expected a name that ends in {', '.join(ENDINGS)}, found {output.suffix!r}")
+        check_writable(output, force=force)
+        if ENDINGS[output.suffix] is Format.JSON:
+            write_json(output, "metrics", self.document, force=force)
+            return
+        with replacing(output, force=force) as temporary:
+            temporary.write_text(self._written(ENDINGS[output.suffix]) + "\n", encoding="utf-8", newline="")

@@ -1,0 +1,121 @@
+"""From the logs that a user names to demonstrations: one bad recording does not spoil the others."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
+from navirl_cli.errors import DemonstrationError, LogError, NavirlError
+from navirl_cli.files import Input
+from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.messages.reader import Progress
+from navirl_cli.logs.sources import Source, sources_of
+from navirl_cli.parallel import map_in_order
+
+#: The hashes of a recording's files, and what came out of it.
+_Result = tuple[tuple[Input, ...], Extraction]
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """What came out of several recordings."""
+
+    #: Of the recordings that gave demonstrations, in the order of the arguments.
+    extractions: tuple[Extraction, ...]
+    #: The files of these recordings.
+    inputs: tuple[Input, ...]
+    #: The recordings that gave none, each with the reason.
+    left_out: tuple[str, ...]
+
+    def demonstrations(self) -> list[Demonstration]:
+        """All demonstrations, with unique ids."""
+        return numbered(self.extractions)
+
+    def notes(self, demonstrations: Iterable[Demonstration]) -> list[str]:
+        """What is odd about recordings and about their demonstrations, as ``name: text``."""
+        notes = [note for one in self.extractions for note in one.notes]
+        return [*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]
+
+    @property
+    def lost(self) -> list[str]:
+        """What was left out, damaged or skipped."""
+        return [*self.left_out, *(line for one in self.extractions for line in (*one.damage, *one.skipped))]
+
+
+def extract_recordings(
+    logs: Sequence[Path | str],
+    settings: ExtractSettings,
+    options: LoadOptions,
+    *,
+    join: bool = False,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Recordings:
+    """Extract every recording among the arguments.
+
+    Args:
+        logs: Files, folders and patterns, as in :func:`navirl_cli.logs.sources.sources_of`.
+        settings: Of the extraction.
+        options: The user's choices about the logs.
+        join: Whether all are pieces of one recording.
+        executor: Where to work on several recordings; by default local processes.
+        progress: Called with bytes done and bytes in all.
+
+    Returns:
+        What came out of them.
+
+    Raises:
+        NavirlError: No recording gave a demonstration.
+    """
+    refused: list[LogError] = []
+    # where all are pieces of one recording none may be missing
+    sources = sources_of(logs, join=join, refused=None if join else refused)
+    # a lone recording is read here, so that the progress can follow its bytes
+    work = partial(_extracted, settings=settings, options=options, progress=progress if len(sources) == 1 else None)
+    good: dict[tuple[str, ...], _Result] = {}
+    failed: list[NavirlError] = [*refused]
+    for source, result in _counted(sources, map_in_order(work, sources, executor), progress):
+        if isinstance(result, NavirlError):
+            failed.append(result)
+        elif (key := tuple(sorted(file.sha256 for file in result[0]))) in good:
+            failed.append(DemonstrationError(f"{source.name}: the same recording as {good[key][1].log}"))
+        else:
+            good[key] = result
+    if len(failed) == 1 and not good:
+        raise failed[0]
+    if not good:
+        raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
+    return Recordings(
+        tuple(extraction for _, extraction in good.values()),
+        tuple(file for files, _ in good.values() for file in files),
+        tuple(f"left out: {error}" for error in failed),
+    )
+
+
+def _counted(
+    sources: Sequence[Source], results: Iterator[_Result | NavirlError], progress: Progress | None
+) -> Iterator[tuple[Source, _Result | NavirlError]]:
+    """Sources with their results, their bytes counted as they are done."""
+    sizes = [sum(path.stat().st_size for path in source.files) for source in sources]
+    done = 0
+    for source, size, result in zip(sources, sizes, results, strict=True):
+        yield source, result
+        done += size
+        if progress is not None:
+            progress(done, sum(sizes))
+
+
+def _extracted(
+    source: Source, settings: ExtractSettings, options: LoadOptions, progress: Progress | None
+) -> _Result | NavirlError:
+    """One recording's files and demonstrations, or the reason why it gave none."""
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            hashes = pool.submit(lambda: tuple(Input.of(path) for path in source.files))
+            extraction = extract(load_recording(source, options, progress), settings)
+            return hashes.result(), extraction
+    except NavirlError as error:
+        return error

@@ -1,0 +1,102 @@
+"""Which demonstrations and which of their steps a reward is learnt from."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from navirl_cli.arrays import BoolArray
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.timing import steps_in_contact
+from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.evidence import Evidence, evidence_of
+
+
+class Steps(StrEnum):
+    """Steps of a path that count."""
+
+    ALL = "all"
+    #: Those during contact.
+    CONTACT = "contact"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What a reward is learnt from."""
+
+    demonstrations: tuple[Demonstration, ...]
+    evidence: Evidence
+    #: Side of the cells of all demonstrations, m.
+    resolution_m: float
+
+
+def select(
+    demonstrations: Sequence[Demonstration],
+    *,
+    conditions: Collection[str] = (),
+    cycle: int | None = None,
+    only_corrected: bool = False,
+    steps: Steps = Steps.ALL,
+) -> Selection:
+    """Choose demonstrations and collect their steps.
+
+    Args:
+        demonstrations: To choose from.
+        conditions: Values of :class:`~navirl_cli.demos.demonstration.Condition`; none for all.
+        cycle: Number of the cycle; None for all.
+        only_corrected: Only those in which the person intervened.
+        steps: All steps, or those during contact; demonstrations without such steps are left out.
+
+    Returns:
+        Demonstrations in their order, and their steps.
+
+    Raises:
+        DemonstrationError: No demonstration or step is left, the intervention is unknown, or the cells differ in size.
+        SceneError: A demonstration's scene has no path from start to goal.
+    """
+    chosen = [
+        one
+        for one in demonstrations
+        if (not conditions or one.condition.value in conditions) and (cycle is None or one.cycle == cycle)
+    ]
+    if only_corrected:
+        chosen = _corrected(chosen)
+    masks = None
+    if chosen and steps is Steps.CONTACT:
+        chosen, masks = _in_contact(chosen)
+    evidence = evidence_of(chosen)
+    return Selection(tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen))
+
+
+def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:
+    """Those in which the person intervened."""
+    unknown = [one.id for one in chosen if one.corrected is None]
+    if unknown:
+        raise DemonstrationError(
+            f"`only_corrected`: expected demonstrations with a wrench, found {', '.join(unknown)} without one, so that "
+            "an intervention is unknown; choose with `condition` and `cycle`"
+        )
+    return [one for one in chosen if one.corrected]
+
+
+def _in_contact(chosen: Sequence[Demonstration]) -> tuple[list[Demonstration], list[BoolArray]]:
+    """Those with contacts, each with the (k - 1,) mask of its steps in contact."""
+    masks = [(one, steps_in_contact(one)) for one in chosen]
+    held = [(one, mask) for one, mask in masks if mask.any()]
+    if not held:
+        raise DemonstrationError("`steps` contact: none of the demonstrations holds a contact; learn from all steps")
+    return [one for one, _ in held], [mask for _, mask in held]
+
+
+def common_resolution_m(demonstrations: Sequence[Demonstration]) -> float:
+    """Side of the cells, m, on which the meaning of a reward per step depends.
+
+    Raises:
+        DemonstrationError: The sides differ.
+    """
+    sides = sorted({one.grid.resolution_m for one in demonstrations})
+    if len(sides) > 1:
+        raise DemonstrationError(
+            f"demonstrations: expected cells of one size, found {', '.join(f'{side:g}' for side in sides)} m: a reward "
+            "per step depends on the step; extract them again with one `resolution`"
+        )
+    return sides[0]

@@ -1,0 +1,18 @@
+"""Print the lowest version that pyproject.toml allows of every dependency, as constraints for pip."""
+
+import sys
+import tomllib
+from pathlib import Path
+
+PROJECT = Path(__file__).parent.parent / "pyproject.toml"
+
+
+def floors(extras: tuple[str, ...] = ()) -> list[str]:
+    """One line ``name==version`` for each dependency, and for those of some extras."""
+    project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
+    needed = [*project["dependencies"], *(one for extra in extras for one in project["optional-dependencies"][extra])]
+    return [one.replace(">=", "==") for one in needed]
+
+
+if __name__ == "__main__":
+    sys.stdout.write("\n".join(floors()) + "\n")

@@ -1,0 +1,56 @@
+"""What a fit is asked besides: refused early, and never at the cost of the fit."""
+
+import factories as make
+import pytest
+
+from navirl_cli.errors import ArgumentError, DemonstrationError, RewardError
+from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.selection import Steps
+
+SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
+TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))
+
+
+@pytest.fixture(scope="module")
+def evidence():
+    return evidence_of(make.by_participants(SCENE, TRUTH, 2, 4, seed=2))
+
+
+@pytest.mark.parametrize(
+    ("questions", "prior", "steps", "message"),
+    [
+        (Questions(cross_validate=True), True, Steps.ALL, "`cross_validate` and `prior` exclude each other"),
+        (Questions(correct_bias=True), True, Steps.ALL, "`correct_bias` needs all steps and no prior"),
+        (Questions(correct_bias=True), False, Steps.CONTACT, "`correct_bias` needs all steps and no prior"),
+        (Questions(correct_bias=True, bootstrap=2), False, Steps.ALL, "leave out `prior`, `steps`, `bootstrap`"),
+    ],
+)
+def test_questions_that_exclude_each_other_are_refused_before_the_fit(evidence, questions, prior, steps, message):
+    with pytest.raises(ArgumentError, match=message):
+        questions.check(evidence, TRUTH, steps, prior=prior)
+
+
+def test_questions_that_the_data_cannot_answer_are_refused_before_the_fit(evidence):
+    Questions(bootstrap=2, profiles=("c0",), cross_validate=True).check(evidence, TRUTH, Steps.ALL, prior=False)
+    with pytest.raises(RewardError, match="unknown parameter c1"):
+        Questions(profiles=("c1",)).check(evidence, TRUTH, Steps.ALL, prior=False)
+    alone = evidence_of(make.drawn(SCENE, TRUTH, 4, seed=1))
+    for questions in (Questions(bootstrap=2), Questions(cross_validate=True)):
+        with pytest.raises(DemonstrationError, match="expected several participants"):
+            questions.check(alone, TRUTH, Steps.ALL, prior=False)
+
+
+def test_a_question_without_an_answer_leaves_the_fit_and_the_other_answers(evidence, monkeypatch):
+    def no_answer(*_args, **_options):
+        raise RewardError("a better fit was found")
+
+    monkeypatch.setattr("navirl_cli.irl.analyses.profile", no_answer)
+    before = fit(evidence, TRUTH)
+    found, analyses, lost = answers(evidence, before, Questions(profiles=("c0",), cross_validate=True))
+    assert found is before
+    assert lost == ["a better fit was found"]
+    assert analyses.profiles == ()
+    assert analyses.validation is not None
