@@ -115,7 +115,9 @@ def test_a_reward_comes_back_with_its_covariance(tmp_path, demonstration):
     document = read_json(path, "reward")
     assert document["initial"] == {"c0": -50.0, "a_g": -0.01, "a_p": -5.0, "sigma_p": 2.0}
     coarse = extract_coarse(demonstration)
-    with pytest.raises(ArtefactError, match=r"learnt on cells of 0\.1 m, but .* cells of 0\.2 m; extract .* --resol"):
+    with pytest.raises(
+        ArtefactError, match=r"learnt on cells of 0\.1 m, but .* cells of 0\.2 m; extract .* `resolution` 0\.1"
+    ):
         read_reward_for(path, [coarse])
 
 

@@ -1,7 +1,7 @@
 """The metrics: each is declared here, with what it needs and the function that computes it, and nowhere else.
 
-To add one, write the function, append a :class:`Metric` to METRICS and write a test. Tables, files, options, completions
-and the page of metrics read METRICS.
+To add one, write the function, append a :class:`Metric` to METRICS and write a test. Tables, files, options,
+completions and the page of metrics read METRICS.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
