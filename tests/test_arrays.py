@@ -106,7 +106,7 @@ def test_types_that_hold_arrays_compare_by_content_or_by_identity(cls):
 
 def test_the_search_for_types_finds_them():
     names = {name_of(cls) for cls in HOLDERS}
-    assert {"demos.demonstration.Demonstration", "irl.values.Policy", "artefacts.rewards.Analyses"} <= names
+    assert {"demos.demonstration.Demonstration", "irl.values.Policy", "irl.analyses.Analyses"} <= names
     assert "demos.demonstration.Contact" not in names
     assert sample(FloatArray).dtype == np.float64
 

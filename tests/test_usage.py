@@ -67,7 +67,8 @@ def test_arguments_that_messages_name_are_options():
     known = option_names()
     unknown = [
         f"{path.relative_to(PACKAGE)}: {shown}"
-        for _, path in files_below_the_commands()
+        for room, path in files_below_the_commands()
+        if room != "api"  # speaks to Python only
         for text in texts_in(ast.parse(path.read_text(encoding="utf-8")))
         for name in re.findall(r"`([a-z][a-z0-9_]*)`", text)
         if (shown := as_options(f"`{name}`")) not in known

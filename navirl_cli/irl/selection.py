@@ -19,7 +19,7 @@ class Steps(StrEnum):
     CONTACT = "contact"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Selection:
     """What a reward is learnt from."""
 
