@@ -4,15 +4,19 @@ import csv
 import io
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
+import factories as make
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy import stats
 
-from navirl_cli.artefacts.demonstrations import read_demonstrations
-from navirl_cli.artefacts.store import read_json
+from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
+from navirl_cli.artefacts.metrics import read_metrics
+from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.metrics import METRICS
 
@@ -44,21 +48,70 @@ def test_all_metrics_stand_below_each_other(navirl, work):
     words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--metrics", "all", "--samples", "50")
     text = navirl(*words).stdout
     document = json.loads(navirl(*words, "--json").stdout)
-    group = next(one for one in document["groups"] if (one["group"], one["paths"]) == ("force, cycle 2", "driven"))
+    group = next(one for one in document["groups"] if (one["group"], one["path_type"]) == ("force, cycle 2", "driven"))
     for name, label in (("work_j", "work J"), ("jerk_m_s3", "mean jerk m/s³"), ("compliance", "space compliance")):
-        told = f"{group['mean'][name]:.3f} ± {group['standard_deviation'][name]:.3f}"
-        assert re.search(rf"^{re.escape(label)} +{re.escape(told)}", text, re.MULTILINE)
+        cell = f"{group['mean'][name]:.3f} ± {group['standard_deviation'][name]:.3f}"
+        assert re.search(rf"^{re.escape(label)} +{re.escape(cell)}", text, re.MULTILINE)
     assert "force, cycle 2, n = 6" in text
-    learnt = next(one for one in document["groups"] if (one["group"], one["paths"]) == ("force, cycle 2", "learnt"))
-    assert {"exact", "error"} < set(learnt)
+    learnt = next(one for one in document["groups"] if (one["group"], one["path_type"]) == ("force, cycle 2", "learnt"))
+    assert {"exact", "monte_carlo_error"} < set(learnt)
     assert learnt["mean"]["hausdorff_m"] >= learnt["mean"]["dissimilarity_m"] > 0
 
 
 def test_chosen_metrics_in_their_order(navirl, work):
-    text = navirl("evaluate", work / "demos.json", "--metrics", "jerk_m_s3,length_m").stdout
-    assert text.splitlines()[0].split("  ")[-2:] == ["mean jerk m/s³", "path length m"]
+    text = navirl("evaluate", work / "demos.json", "--metrics", "area_m2,length_m").stdout
+    assert re.split(" {2,}", text.splitlines()[0])[-2:] == ["area under path m²", "path length m"]
     refused = navirl("evaluate", work / "demos.json", "--metrics", "length_m,speed", code=2).stderr
     assert "unknown metric 'speed'; navirl evaluate --list-metrics lists them" in " ".join(refused.split())
+
+
+def test_metrics_of_driven_paths_have_a_table_of_their_own(navirl, work):
+    words = ("evaluate", work / "demos.json", "--metrics", "jerk_m_s3,length_m")
+    first, second = navirl(*words).stdout.split("\n\n")[:2]
+    assert "nominal" in first
+    assert re.split(" {2,}", second.splitlines()[0])[-1] == "mean jerk m/s³"
+    assert {re.split(" {2,}", line)[1] for line in second.splitlines()[1:]} == {"driven"}
+    assert " -" not in second, "no value is shown as missing where the type of path has none"
+
+
+def test_missing_values_have_reasons_in_every_format(navirl, tmp_path):
+    grid = make.open_grid(40, 21)
+    cells = [[column, 10] for column in range(1, 39)]
+    trials = [
+        make.demonstration(grid, cells, [[2.0, 0.5]], number=1),
+        make.demonstration(grid, cells, number=2, laid_out_m_s=0.4),
+    ]
+    document = demonstrations_document(trials, [], {})
+    write_json(tmp_path / "demos.json", "demonstrations", document, force=False)
+    words = ("evaluate", tmp_path / "demos.json", "--metrics", "min_distance_m,duration_s,hausdorff_m")
+    content = json.loads(navirl(*words, "-o", tmp_path / "m.json", "--json").stdout)
+    assert read_metrics(tmp_path / "m.json")["groups"] == content["groups"]
+    driven = next(one for one in content["groups"] if one["path_type"] == "driven")
+    assert driven["missing"] == {
+        "min_distance_m": {"no people in the scene": 1}, "duration_s": {"times not measured": 1}
+    }  # fmt: skip
+    assert content["demonstrations"][1]["missing"] == {
+        "min_distance_m": "no people in the scene", "duration_s": "times not measured"
+    }  # fmt: skip
+    assert content["missing"] == {"hausdorff_m": "no learnt reward given"}
+    for style in ("text", "markdown", "latex"):
+        text = navirl(*words, "--format", style).stdout
+        assert "Missing: min. distance (no people in the scene) in force: 1 of 2." in text
+        assert "Missing: duration (times not measured) in force: 1 of 2." in text
+        assert "Left out: mod. Hausdorff: no learnt reward given." in text
+    rows = list(csv.DictReader(io.StringIO(navirl(*words, "--format", "csv").stdout)))
+    assert rows[0]["missing"] == "min_distance_m: no people in the scene (1); duration_s: times not measured (1)"
+    assert (rows[0]["duration_s_std"], rows[0]["hausdorff_m_mean"]) == ("", "")
+
+
+def test_without_a_pair_no_statistics_are_imported(work):
+    program = (
+        "import sys; from navirl_cli.cli import cli; cli(sys.argv[1:], standalone_mode=False); "
+        "sys.exit(', '.join(name for name in ('scipy.stats', 'scipy.signal') if name in sys.modules) or None)"
+    )
+    words = [sys.executable, "-c", program, "evaluate", str(work / "demos.json"), "--reward", str(work / "learnt.json")]
+    found = subprocess.run([*words, "--metrics", "all", "--samples", "2"], capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stderr) == (0, "")
 
 
 def test_pairs_are_compared_by_participant(navirl, work):
@@ -73,13 +126,17 @@ def test_pairs_are_compared_by_participant(navirl, work):
     expected = {p: np.mean(means[p, "joystick"]) - np.mean(means[p, "cycle 2"]) for p in ("p01", "p02", "p03")}
     found = pair["metrics"]["length_m"]
     assert found["by_participant"] == pytest.approx(expected)
-    assert (found["n"], found["lower"]) == (3, None)
-    assert found["p_value"] == pytest.approx(stats.wilcoxon(list(expected.values())).pvalue)
+    values = np.array(list(expected.values()))
+    assert found["student_interval"] == pytest.approx(stats.t.interval(0.95, 2, values.mean(), stats.sem(values)))
+    assert (found["n"], found["bootstrap_interval"]) == (3, None)
+    assert found["wilcoxon_p"] == pytest.approx(stats.wilcoxon(values).pvalue)
     text = navirl(*words).stdout
-    assert "joystick less force, cycle 2, driven paths, paired by participant" in text
-    assert re.search(
-        rf"^path length m +{found['mean_difference']:+.3f} +- +3 +{found['p_value']:.3g} ", text, re.MULTILINE
-    )
+    assert "joystick - force, cycle 2, driven paths, paired by participant" in text
+    low, high = found["student_interval"]
+    cells = [f"{found['mean_difference']:+.3f}", f"{low:+.3f} to {high:+.3f}", "-", "3", f"{found['wilcoxon_p']:.4f}"]
+    table = text[text.index("joystick - force, cycle 2") :].splitlines()
+    assert re.split(" {2,}", next(line for line in table if line.startswith("path length m")))[1:6] == cells
+    assert "A bootstrap interval needs 4 participants, Student's interval 2." in text
     refused = navirl("evaluate", work / "demos.json", "--pair", "joystick", "force", code=1).stderr
     assert "expected the names of two groups, found 'force'; there are 'force, cycle 1', 'force, cycle 2'" in refused
 
@@ -105,7 +162,7 @@ def test_ranks_are_told_with_their_test(navirl, work):
 def test_two_rewards_stand_side_by_side(navirl, work):
     words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--reward", work / "first.json")
     document = json.loads(navirl(*words, "--samples", "20", "--json").stdout)
-    assert {one["paths"] for one in document["groups"]} >= {"learnt, learnt", "learnt, first"}
+    assert {one["path_type"] for one in document["groups"]} >= {"learnt, learnt", "learnt, first"}
     again = navirl(*words[:2], *words[2:4], *words[2:4], code=1).stderr
     assert "another --reward is called 'learnt' too; rename one of the files" in again
 
@@ -114,8 +171,9 @@ def test_a_precision_is_kept(navirl, work):
     words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--precision", "0.02")
     document = json.loads(navirl(*words, "--samples", "50", "--json").stdout)
     for one in document["groups"]:
-        if one["paths"] == "learnt":
-            for name, error in one["error"].items():
+        if one["path_type"] == "learnt":
+            for name in ("min_distance_m", "area_m2"):
+                error = one["monte_carlo_error"][name]
                 assert error <= 0.025 * max(abs(one["mean"][name]), one["standard_deviation"][name])
 
 

@@ -6,9 +6,10 @@ import factories as make
 import numpy as np
 import pytest
 from path_values import drive_values
+from scipy.signal import savgol_filter
 
 from navirl_cli.demos.demonstration import Contact
-from navirl_cli.evaluation.motion import derivatives
+from navirl_cli.evaluation.motion import RATE_HZ, WINDOW, derivatives
 
 GRID = make.open_grid(60, 30, (-3.0, -1.5))
 
@@ -30,6 +31,15 @@ def test_derivatives_of_a_cubic_are_exact():
     assert velocity == pytest.approx(np.stack([0.6 * at**2 - 1, at], axis=1), abs=0.01)
     assert acceleration == pytest.approx(np.stack([1.2 * at, np.ones_like(at)], axis=1), abs=0.02)
     assert jerk == pytest.approx(np.tile([1.2, 0.0], (len(at), 1)), abs=0.05)
+
+
+def test_derivatives_are_those_of_savitzky_and_golay():
+    rng = np.random.default_rng(3)
+    t = np.linspace(0, 9, 91)
+    path = np.cumsum(rng.normal(0, 0.02, (91, 2)), axis=0)
+    for order, found in enumerate(derivatives(t, path), start=1):
+        expected = savgol_filter(path, WINDOW, 3, deriv=order, delta=1 / RATE_HZ, axis=0)
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
 def test_uniform_motion_has_speed_and_nothing_else():

@@ -26,6 +26,7 @@ from navirl_cli.artefacts.demonstrations import (
     gain_document,
     settings_document,
 )
+from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
 from navirl_cli.demos.contact import PushSettings
 from navirl_cli.demos.demonstration import Condition, Demonstration
@@ -55,7 +56,6 @@ from navirl_cli.logs.overview import Overview, overview
 from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.sources import sources_of
 from navirl_cli.parallel import cores
-from navirl_cli.reports.evaluation import document as metrics_document
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import remarks
 from navirl_cli.reports.fit import warnings as fit_warnings

@@ -28,7 +28,7 @@ from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
-from navirl_cli.reports.evaluation import tables
+from navirl_cli.reports.evaluation import evaluation_text
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import report
 
@@ -306,7 +306,7 @@ class Evaluation:
         return self._written(Format.TEXT)
 
     def _written(self, how: Format) -> str:
-        return tables(self.comparison, self.pairs, self.ranks, self.metrics, how)
+        return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how)
 
     def to_frame(self, table: str = "groups") -> "DataFrame":
         """One of the tables.

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
@@ -33,7 +34,7 @@ from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
 from navirl_cli.files import Input, check_writable, replacing
 from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.evaluation import document, metrics_table, tables
+from navirl_cli.reports.evaluation import evaluation_text, metrics_table
 
 
 class Names(click.ParamType):  # type: ignore[type-arg]
@@ -166,13 +167,13 @@ def evaluate(
     compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
     ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
     inputs = [Input.of(path) for path in (demos, *rewards)]
-    content = document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)
+    content = metrics_document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)
     if output is not None:
-        _write(output, content, tables(result, compared, ranked, metrics, ENDINGS[output.suffix]), force=force)
+        _write(output, content, evaluation_text(result, compared, ranked, metrics, ENDINGS[output.suffix]), force=force)
     if as_json or style == Format.JSON:
         echo_json(content)
     else:
-        echo(tables(result, compared, ranked, metrics, Format(style)))
+        echo(evaluation_text(result, compared, ranked, metrics, Format(style)))
     finish(result.notes)
 
 

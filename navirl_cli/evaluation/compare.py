@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, Shown, draw, expected_of
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
 from navirl_cli.evaluation.lines import Lines
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, measure, missing_of
+from navirl_cli.evaluation.metrics import NO_REWARD, PAPER_METRICS, Metric, measure, missing_of
 from navirl_cli.evaluation.motion import Drive
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
@@ -31,14 +31,16 @@ KINDS: dict[str, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, eq=False)
+class Comparison(ByContent):
     """All metrics of a set of demonstrations."""
 
     groups: tuple[GroupMetrics, ...]
     rows: tuple[Measured, ...]
     #: What could not be measured, and why.
     notes: tuple[str, ...]
+    #: Of metrics that no path has: the reason.
+    missing: Mapping[str, str]
 
 
 def compare(
@@ -91,7 +93,8 @@ def compare(
             kind = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
             found[kind] = expected_of(group, kind, members, metrics)
         groups += [found[kind] for kind in sorted(found, key=lambda kind: (_place(kind), kind)) if found[kind].mean]
-    return Comparison(tuple(groups), tuple(rows), tuple(notes))
+    missing = {metric.name: NO_REWARD for metric in metrics if metric.near is not None and not rewards}
+    return Comparison(tuple(groups), tuple(rows), tuple(notes), missing)
 
 
 def _place(kind: str) -> int:

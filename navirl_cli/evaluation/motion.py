@@ -106,16 +106,26 @@ def derivatives(t_s: FloatArray, xy_m: FloatArray) -> tuple[FloatArray, FloatArr
         (k, 2) each, in m/s, m/s^2 and m/s^3, at 10 Hz: derivatives of cubics fitted over 1.1 s (Savitzky and Golay,
         Analytical Chemistry 36 (1964)); NaN where the path is shorter than that.
     """
-    from scipy.signal import savgol_filter
-
     at = np.arange(t_s[0], t_s[-1] + 1e-9, 1 / RATE_HZ)
     if len(at) < WINDOW:
         missing = np.full((1, 2), np.nan)
         return missing, missing, missing
     line = np.stack([np.interp(at, t_s, axis) for axis in xy_m.T], axis=1)
-    velocity, acceleration, jerk = (
-        savgol_filter(line, WINDOW, 3, deriv=order, delta=1 / RATE_HZ, axis=0) for order in (1, 2, 3)
-    )
+    windows = np.lib.stride_tricks.sliding_window_view(line, WINDOW, axis=0)
+    half = WINDOW // 2
+    offsets = np.arange(-half, half + 1) / RATE_HZ
+    # (4, WINDOW): samples of a window to the coefficients of its least-squares cubic about the window's middle.
+    fitted = np.linalg.pinv(np.vander(offsets, 4, increasing=True))
+    rates = []
+    for order in (1, 2, 3):
+        # (WINDOW, WINDOW): samples to derivatives at each of the window's places; those before the first and after the
+        # last middle are taken from the first and last window.
+        powers = np.polynomial.polynomial.polyder(np.eye(4), order)
+        there = np.vander(offsets, 4 - order, increasing=True) @ powers @ fitted
+        rates.append(
+            np.concatenate([there[:half] @ windows[0].T, windows @ there[half], there[half + 1 :] @ windows[-1].T])
+        )
+    velocity, acceleration, jerk = rates
     return velocity, acceleration, jerk
 
 

@@ -1,25 +1,23 @@
-"""What ``navirl evaluate`` prints and writes."""
+"""What ``navirl evaluate`` prints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
-from navirl_cli.artefacts.store import number
-from navirl_cli.documents.tables import Column, Format, Table, formatted
-from navirl_cli.evaluation.compare import DRIVEN, KINDS, Comparison
-from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.artefacts.metrics import Pairs
+from navirl_cli.documents.tables import Cell, Column, Format, Interval, Spread, Table, written
+from navirl_cli.evaluation.compare import DRIVEN, KINDS, LEARNT, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import METRICS, Metric, Values
-from navirl_cli.evaluation.paired import Paired
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, Metric
+from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
-from navirl_cli.files import Input
 
-#: Two groups and their comparison by metric.
-Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
-#: More metrics stand below each other.
+#: More metrics are written below each other.
 MOST_COLUMNS = 6
+#: Digits after the point of metrics.
+DECIMALS = 3
 
 
 def metrics_table() -> Table:
@@ -29,115 +27,205 @@ def metrics_table() -> Table:
     return Table(columns, rows)
 
 
-def tables(result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Sequence[Metric], how: Format) -> str:
-    """Everything as text.
+def evaluation_text(
+    result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Sequence[Metric], how: Format
+) -> str:
+    """Everything in one format.
 
     Args:
         result: Metrics by group.
-        pairs: Comparisons.
+        pairs: Comparisons of groups.
         ranks: Of demonstrations.
         metrics: That were asked for.
         how: The format; CSV holds the groups only, with one number a column.
     """
     if how is Format.CSV:
-        return _groups_csv(result, metrics)
+        return written(_numbers(result, metrics), how)
     wide = len(metrics) <= MOST_COLUMNS
-    parts = [formatted(*_groups(result, metrics), how)] if wide else _by_metric(result, metrics, how)
-    driven = [
-        row for row in result.groups if row.kind == DRIVEN and np.isfinite(list(row.half_interval.values())).any()
+    tables = [
+        *(_side_by_side(result, metrics) if wide else _below_each_other(result, metrics)),
+        *([_intervals(result, metrics)] if wide else []),
+        *(_paired(one, other, found, metrics) for one, other, found in pairs),
+        *([_ranks(ranks)] if ranks else []),
     ]
-    if driven and wide:
-        parts += [
-            "95 % intervals of the means of driven paths, over participants",
-            formatted(*_intervals(driven, metrics), how),
-        ]
-    for one, other, found in pairs:
-        parts += [f"{one} less {other}, driven paths, paired by participant", formatted(*_paired(found, metrics), how)]
-    if ranks:
-        parts += [uniform_line(ranks), formatted(*_ranks(ranks), how)]
-    if how is Format.TEXT:
-        parts.append("\n".join(_legend(result, metrics)))
-    return "\n\n".join(parts)
+    parts = [written(table, how) for table in tables if table is not None]
+    left_out = _gathered((reason, BY_NAME[name].label) for name, reason in result.missing.items())
+    missing = "\n".join(f"Left out: {', '.join(labels)}: {reason}." for reason, labels in left_out.items())
+    legend = "\n".join(_legend(result, metrics)) if how is Format.TEXT else ""
+    return "\n\n".join(filter(None, [*parts, missing, legend]))
 
 
-def _groups(result: Comparison, metrics: Sequence[Metric]) -> tuple[list[str], list[list[str]]]:
-    """Mean and spread by group and kind of path."""
-    header = ["group", "paths", "n", *(metric.heading for metric in metrics)]
-    rows = [
-        [row.group, row.kind, str(row.count), *(_mean_and_spread(row, metric.name) for metric in metrics)]
+def group_table(result: Comparison, metrics: Sequence[Metric], caption: str = "") -> Table:
+    """Mean and standard deviation by group and type of path.
+
+    Args:
+        result: Metrics by group.
+        metrics: The columns; rows of paths that have none of them are left out.
+        caption: Stands above.
+    """
+    columns = [
+        Column("group"),
+        Column("path_type", "paths"),
+        Column("n"),
+        *(Column(metric.name, metric.heading, DECIMALS) for metric in metrics),
+    ]
+    rows: list[tuple[Cell, ...]] = [
+        (row.group, row.kind, row.count, *(_cell(row, metric) for metric in metrics))
         for row in result.groups
+        if any(metric.name in row.mean for metric in metrics)
     ]
-    return header, rows
+    return Table(tuple(columns), tuple(rows), caption, _missing_note(result.groups, metrics))
 
 
-def group_table(result: Comparison, metrics: Sequence[Metric]) -> Table:
-    """Mean and spread by group and kind of path, for a report."""
-    header, rows = _groups(result, metrics)
-    return Table.of_texts(tuple(header), tuple(map(tuple, rows)), "Mean ± standard deviation.")
+def _missing_note(rows: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> str:
+    """Why values are missing: each reason with the metrics that it concerns and the groups."""
+    groups = dict.fromkeys(row.group for row in rows)
+    found = [
+        (reason, where, metric.label)
+        for group in groups
+        for metric in metrics
+        for reason, where in _missing_in([row for row in rows if row.group == group], metric.name)
+    ]
+    labels = _gathered(((reason, where), label) for reason, where, label in found)
+    places = _gathered(((reason, ", ".join(own)), where) for (reason, where), own in labels.items())
+    parts = [
+        f"{own} ({reason})" + ("" if where == list(groups) else f" in {' / '.join(where)}")
+        for (reason, own), where in places.items()
+    ]
+    return f"Missing: {'; '.join(parts)}." if parts else ""
 
 
-def _by_metric(result: Comparison, metrics: Sequence[Metric], how: Format) -> list[str]:
-    """A table for each group, with a row for each metric that has values in it."""
-    parts = []
+def _missing_in(rows: Sequence[GroupMetrics], name: str) -> Iterable[tuple[str, str]]:
+    """Reasons for which a group lacks values of a metric, and where: the group, types of paths unless it is all."""
+    having = [row for row in rows if name in row.mean]
+    kinds = _gathered(
+        ((reason, count, row.count), row.kind) for row in having for reason, count in row.missing.get(name, {}).items()
+    )
+    for (reason, count, of), own in kinds.items():
+        types = "" if len(own) == len(having) else f", {', '.join(own)}"
+        yield reason, f"{rows[0].group}{types}" + ("" if count == of else f": {count} of {of}")
+
+
+Key = TypeVar("Key")
+
+
+def _gathered(items: Iterable[tuple[Key, str]]) -> dict[Key, list[str]]:
+    """Texts by key, in the order in which they come."""
+    found: dict[Key, list[str]] = {}
+    for key, text in items:
+        found.setdefault(key, []).append(text)
+    return found
+
+
+def _side_by_side(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
+    """A table of the metrics of all paths, and one each of those of driven and of learnt paths only."""
+    parts = [[metric for metric in metrics if metric.paths == paths] for paths in ("all", "driven", "learnt")]
+    return [table for part in parts if part and (table := group_table(result, part)).rows]
+
+
+def _below_each_other(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
+    """For each group the same tables, transposed: a row for each metric, a column for each type of path."""
+    tables = []
     for group in dict.fromkeys(row.group for row in result.groups):
-        kinds = [row for row in result.groups if row.group == group]
-        told = [metric for metric in metrics if any(isfinite(row.mean.get(metric.name, float("nan"))) for row in kinds)]
-        rows = [[metric.heading, *(_mean_and_spread(row, metric.name) for row in kinds)] for metric in told]
-        parts += [f"{group}, n = {kinds[0].count}", formatted(["metric", *(row.kind for row in kinds)], rows, how)]
-    return parts
+        caption = f"{group}, n = {next(row.count for row in result.groups if row.group == group)}"
+        for paths in ("all", "driven", "learnt"):
+            part = [metric for metric in metrics if metric.paths == paths]
+            rows = [row for row in result.groups if row.group == group and any(m.name in row.mean for m in part)]
+            if part and rows:
+                columns = (Column("metric"), *(Column(row.kind, decimals=DECIMALS) for row in rows))
+                cells: list[tuple[Cell, ...]] = [(m.heading, *(_cell(row, m) for row in rows)) for m in part]
+                own = caption if paths == "all" else f"{group}, {paths} paths only"
+                tables.append(Table(columns, tuple(cells), own, _missing_note(rows, part)))
+    return tables
 
 
-def _mean_and_spread(row: GroupMetrics, name: str) -> str:
-    mean, spread = row.exact.get(name, row.mean.get(name, float("nan"))), row.std.get(name, float("nan"))
-    if not isfinite(mean):
-        return "-"
-    return f"{mean:.3f}" + (f" ± {spread:.3f}" if isfinite(spread) else "")
+def _cell(row: GroupMetrics, metric: Metric) -> Spread:
+    """Mean, exact where visits give it, and standard deviation."""
+    return Spread(row.expected(metric.name), row.std.get(metric.name, float("nan")))
 
 
-def _intervals(driven: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> tuple[list[str], list[list[str]]]:
-    """From where to where the mean of each group lies."""
-    rows = []
-    for row in driven:
-        edges = [(row.mean.get(m.name, np.nan), row.half_interval.get(m.name, np.nan)) for m in metrics]
-        cells = [f"{mean - half:.3f} to {mean + half:.3f}" if isfinite(half) else "-" for mean, half in edges]
-        rows.append([row.group, *cells])
-    return ["group", *(metric.heading for metric in metrics)], rows
+def _intervals(result: Comparison, metrics: Sequence[Metric]) -> Table | None:
+    """Intervals of the means of driven paths; None where no group has one."""
+    driven = [row for row in result.groups if row.kind == DRIVEN]
+    known = [m for m in metrics if any(isfinite(row.half_interval.get(m.name, np.nan)) for row in driven)]
+    rows: list[tuple[Cell, ...]] = [
+        (row.group, row.participants, *(_interval(row, metric.name) for metric in known)) for row in driven
+    ]
+    columns = (Column("group"), Column("participants"), *(Column(m.name, m.heading, DECIMALS) for m in known))
+    caption = "95 % intervals of the means of driven paths (Student, over participants)"
+    note = "" if all(row.participants > 1 for row in driven) else "One participant has no interval."
+    return Table(columns, tuple(rows), caption, note) if known else None
 
 
-def _groups_csv(result: Comparison, metrics: Sequence[Metric]) -> str:
-    """The same with a column for each number."""
-    parts = ("mean", "std", "half_interval", "error", "exact")
-    header = ["group", "paths", "n", *(f"{metric.name}_{part}" for metric in metrics for part in parts)]
+def _interval(row: GroupMetrics, name: str) -> Interval:
+    """Mean less and plus half the interval."""
+    mean, half = row.mean.get(name, float("nan")), row.half_interval.get(name, float("nan"))
+    return Interval(mean - half, mean + half)
+
+
+def _numbers(result: Comparison, metrics: Sequence[Metric]) -> Table:
+    """The groups with a column for each number, and the reasons for missing ones."""
+    columns = [Column("group"), Column("path_type"), Column("n")]
+    columns += [
+        Column(f"{m.name}_{part}") for m in metrics for part in ("mean", "std", "half_interval", "error", "exact")
+    ]
     rows = []
     for row in result.groups:
-        numbers = [
-            values.get(metric.name, float("nan"))
-            for metric in metrics
-            for values in (row.mean, row.std, row.half_interval, row.error, row.exact)
-        ]
-        rows.append([row.group, row.kind, str(row.count), *(f"{n:.6g}" if isfinite(n) else "" for n in numbers)])
-    return formatted(header, rows, Format.CSV)
+        values = (row.mean, row.std, row.half_interval, row.error, row.exact)
+        numbers = [own.get(metric.name) for metric in metrics for own in values]
+        reasons = [f"{name}: {reason} ({n})" for name, own in row.missing.items() for reason, n in own.items()]
+        rows.append((row.group, row.kind, row.count, *numbers, "; ".join(reasons)))
+    return Table((*columns, Column("missing")), tuple(rows))
 
 
-def _paired(found: Mapping[str, Paired], metrics: Sequence[Metric]) -> tuple[list[str], list[list[str]]]:
+def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence[Metric]) -> Table:
     """Differences by metric."""
-    header = ["metric", "mean difference", "95 % interval", "n", "p (Wilcoxon)", "Cohen's d_z", "rank-biserial r"]
-    rows = []
-    for metric in metrics:
-        if metric.name not in found:
-            continue
-        one = found[metric.name]
-        lower, upper = one.bootstrap or (np.nan, np.nan)
-        interval = f"{lower:+.3f} to {upper:+.3f}" if isfinite(lower) else "-"
-        sizes = [
-            f"{value:.3g}" if isfinite(value) else "-" for value in (one.wilcoxon_p, one.cohen_dz, one.rank_biserial)
-        ]
-        rows.append([metric.heading, f"{one.mean:+.3f}", interval, str(one.n), *sizes])
-    return header, rows
+    columns = (
+        Column("metric"),
+        Column("mean_difference", "mean difference", DECIMALS, sign=True),
+        Column("student_interval", "95 % interval (Student)", DECIMALS, sign=True),
+        Column("bootstrap_interval", "95 % interval (bootstrap)", DECIMALS, sign=True),
+        Column("n"),
+        Column("wilcoxon_p", "p (Wilcoxon)", 4),
+        Column("cohen_dz", "Cohen's d_z", 2),
+        Column("rank_biserial", "rank-biserial r", 2),
+    )
+    known = [(metric, found[metric.name]) for metric in metrics if metric.name in found]
+    rows = tuple(
+        (
+            metric.heading,
+            pair.mean,
+            Interval(*pair.student),
+            None if pair.bootstrap is None else Interval(*pair.bootstrap),
+            pair.n,
+            pair.wilcoxon_p,
+            pair.cohen_dz,
+            pair.rank_biserial,
+        )
+        for metric, pair in known
+    )
+    return Table(columns, rows, f"{one} - {other}, driven paths, paired by participant", _paired_note(known, metrics))
+
+
+def _paired_note(known: Sequence[tuple[Metric, Paired]], metrics: Sequence[Metric]) -> str:
+    """Why numbers of a comparison are missing."""
+    pairs = [pair for _, pair in known]
+    there = {metric.name for metric, _ in known}
+    lacking = [metric.label for metric in metrics if metric.name not in there]
+    notes = []
+    if any(pair.n < FEWEST for pair in pairs):
+        notes.append(f"A bootstrap interval needs {FEWEST} participants, Student's interval 2.")
+    if any(not isfinite(pair.wilcoxon_p) for pair in pairs):
+        notes.append("Without a difference there is no test and no effect size.")
+    elif any(not isfinite(pair.cohen_dz) for pair in pairs):
+        notes.append("Cohen's d_z needs 2 participants whose differences differ.")
+    if lacking:
+        notes.append(f"No participant has driven paths of both groups with a value of: {', '.join(lacking)}.")
+    return " ".join(notes)
 
 
 def uniform_line(ranks: Sequence[Rank]) -> str:
-    """What ranks say of a model, in a line."""
+    """How well the ranks agree with a calibrated model, in a line."""
     statistic, p_value = uniformity(ranks)
     return (
         f"ranks of {len(ranks)} demonstrations among the policy's paths; a calibrated model gives uniform ranks: "
@@ -145,100 +233,30 @@ def uniform_line(ranks: Sequence[Rank]) -> str:
     )
 
 
-def _ranks(ranks: Sequence[Rank]) -> tuple[list[str], list[list[str]]]:
+def _ranks(ranks: Sequence[Rank]) -> Table:
     """Rank by demonstration."""
-    header = ["demonstration", "group", "log-likelihood", "rank"]
-    return header, [[one.id, one.group, f"{one.log_likelihood:.3f}", f"{one.rank:.3f}"] for one in ranks]
+    columns = (
+        Column("demonstration"),
+        Column("group"),
+        Column("log_likelihood", "log-likelihood", DECIMALS),
+        Column("rank", decimals=DECIMALS),
+    )
+    rows = tuple((one.id, one.group, one.log_likelihood, one.rank) for one in ranks)
+    return Table(columns, rows, uniform_line(ranks))
 
 
 def _legend(result: Comparison, metrics: Sequence[Metric]) -> list[str]:
-    """What the words mean."""
-    kinds = dict.fromkeys(row.kind.partition(", ")[0] if row.kind not in KINDS else row.kind for row in result.groups)
-    learnt = [row for row in result.groups if row.error]
-    lines = ["mean ± standard deviation over n paths; of learnt paths of one path, over n demonstrations' scenes"]
+    """The meaning of the metrics and of the types of paths."""
+    kinds = {row.kind if row.kind in KINDS else LEARNT for row in result.groups}
+    lines = ["mean ± standard deviation over n demonstrations; of learnt paths of one path, in the scenes of n of them"]
     lines += [f"{metric.label}: {metric.definition}" for metric in metrics]
-    lines += [f"{kind}: {KINDS[kind]}" for kind in KINDS if kind in kinds]
+    lines += [f"{kind}: {text}" for kind, text in KINDS.items() if kind in kinds]
     errors = [
         row.error[m.name] / row.std[m.name]
-        for row in learnt
+        for row in result.groups
         for m in metrics
-        if row.std.get(m.name) and m.name not in row.exact
+        if m.name in row.error and m.name not in row.exact and row.std[m.name] > 0
     ]
     if errors:
         lines.append(f"Monte Carlo error of learnt paths' means: at most {max(errors):.2g} of their standard deviation")
     return lines
-
-
-def document(
-    result: Comparison,
-    pairs: Pairs,
-    ranks: Sequence[Rank],
-    metrics: Sequence[Metric],
-    inputs: Sequence[Input],
-    precision: Precision,
-    seed: int,
-) -> dict[str, Any]:
-    """The content of a metrics file."""
-    names = [metric.name for metric in metrics]
-    learnt = any(row.error for row in result.groups)
-    return {
-        "inputs": [vars(one) for one in inputs],
-        "samples": precision.samples if learnt else 0,
-        "precision": precision.error,
-        "seed": seed,
-        "groups": [
-            {
-                "group": row.group,
-                "paths": row.kind,
-                "count": row.count,
-                "mean": _chosen(row.mean, names),
-                "standard_deviation": _chosen(row.std, names),
-                **(
-                    {"error": _chosen(row.error, names), "exact": _chosen(row.exact, names)}
-                    if row.error
-                    else {"half_interval": _chosen(row.half_interval, names)}
-                ),
-            }
-            for row in result.groups
-        ],
-        "demonstrations": [
-            {"id": row.id, "group": row.group, "paths": DRIVEN, "metrics": _chosen(row.values[DRIVEN], names)}
-            for row in result.rows
-        ],
-        "pairs": [
-            {"group": one, "less": other, "metrics": {name: _pair(value) for name, value in found.items()}}
-            for one, other, found in pairs
-        ],
-        "ranks": None if not ranks else _ranks_document(ranks),
-    }
-
-
-def _chosen(values: Values, names: Sequence[str]) -> dict[str, float | None]:
-    """Values asked for, for JSON, which knows no NaN."""
-    return {name: number(values[name]) for name in names if name in values}
-
-
-def _pair(one: Paired) -> dict[str, Any]:
-    lower, upper = one.bootstrap or (np.nan, np.nan)
-    return {
-        "mean_difference": one.mean,
-        "lower": number(lower),
-        "upper": number(upper),
-        "n": one.n,
-        "p_value": number(one.wilcoxon_p),
-        "cohen_dz": number(one.cohen_dz),
-        "rank_biserial": number(one.rank_biserial),
-        "by_participant": dict(one.differences),
-    }
-
-
-def _ranks_document(ranks: Sequence[Rank]) -> dict[str, Any]:
-    statistic, p_value = uniformity(ranks)
-    return {
-        "statistic": statistic,
-        "p_value": p_value,
-        "demonstrations": [
-            {"id": one.id, "group": one.group, "log_likelihood": number(one.log_likelihood), "rank": one.rank}
-            for one in ranks
-        ],
-    }

@@ -1,0 +1,133 @@
+"""Metrics of paths as a file: what ``navirl evaluate`` writes."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from navirl_cli.artefacts.store import number, read_json
+from navirl_cli.evaluation.compare import DRIVEN, Comparison
+from navirl_cli.evaluation.drawn import Precision
+from navirl_cli.evaluation.groups import GroupMetrics, Measured
+from navirl_cli.evaluation.metrics import Metric, Values
+from navirl_cli.evaluation.paired import Interval, Paired
+from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.files import Input
+
+#: Two groups and their comparison by metric.
+Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
+#: Metrics of files of version 1 by their present names.
+_RENAMED = {"peak_n": "peak_force_n", "impulse_ns": "impulse_n_s"}
+
+
+def metrics_document(
+    result: Comparison,
+    pairs: Pairs,
+    ranks: Sequence[Rank],
+    metrics: Sequence[Metric],
+    inputs: Sequence[Input],
+    precision: Precision,
+    seed: int,
+) -> dict[str, Any]:
+    """The content of a metrics file.
+
+    Args:
+        result: Metrics by group.
+        pairs: Comparisons of groups.
+        ranks: Of demonstrations; none where they were not asked for.
+        metrics: That were asked for.
+        inputs: The files that it was made from.
+        precision: How many paths were drawn.
+        seed: Of what was drawn by chance.
+    """
+    names = [metric.name for metric in metrics]
+    learnt = any(row.error for row in result.groups)
+    return {
+        "inputs": [vars(one) for one in inputs],
+        "samples": precision.samples if learnt else 0,
+        "precision": precision.error,
+        "seed": seed,
+        "metrics": names,
+        "missing": result.missing,
+        "groups": [_group(row, names) for row in result.groups],
+        "demonstrations": [_demonstration(row, names) for row in result.rows],
+        "pairs": [
+            {"group": one, "minus": other, "metrics": {name: _pair(value) for name, value in found.items()}}
+            for one, other, found in pairs
+        ],
+        "ranks": None if not ranks else _ranks(ranks),
+    }
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Read a metrics file; one of version 1 as the present version holds the same.
+
+    Raises:
+        ArtefactError: The file is missing, no metrics file, or breaks its schema.
+    """
+    return read_json(path, "metrics")
+
+
+def _group(row: GroupMetrics, names: Sequence[str]) -> dict[str, Any]:
+    """One group's paths of one type."""
+    drawn = {"monte_carlo_error": _chosen(row.error, names), "exact": _chosen(row.exact, names)}
+    measured = {"participants": row.participants, "half_interval": _chosen(row.half_interval, names)}
+    return {
+        "group": row.group,
+        "path_type": row.kind,
+        "count": row.count,
+        "mean": _chosen(row.mean, names),
+        "standard_deviation": _chosen(row.std, names),
+        **(drawn if row.error else measured),
+        "missing": {name: dict(reasons) for name, reasons in row.missing.items()},
+    }
+
+
+def _demonstration(row: Measured, names: Sequence[str]) -> dict[str, Any]:
+    """One demonstration as it was driven."""
+    return {
+        "id": row.id,
+        "participant": row.participant,
+        "group": row.group,
+        "path_type": DRIVEN,
+        "metrics": _chosen(row.values[DRIVEN], names),
+        "missing": dict(row.missing.get(DRIVEN, {})),
+    }
+
+
+def _chosen(values: Values, names: Iterable[str]) -> dict[str, float | None]:
+    """Values in the order of the names; null for those that do not exist."""
+    return {name: number(values[name]) for name in names if name in values}
+
+
+def _pair(one: Paired) -> dict[str, Any]:
+    """One comparison of two groups."""
+    return {
+        "mean_difference": one.mean,
+        "student_interval": _interval(one.student),
+        "bootstrap_interval": _interval(one.bootstrap),
+        "n": one.n,
+        "wilcoxon_p": number(one.wilcoxon_p),
+        "cohen_dz": number(one.cohen_dz),
+        "rank_biserial": number(one.rank_biserial),
+        "by_participant": dict(one.differences),
+    }
+
+
+def _interval(interval: Interval | None) -> list[float] | None:
+    """Lower and upper end; null for an interval that does not exist."""
+    if interval is None or number(interval.lower) is None:
+        return None
+    return [interval.lower, interval.upper]
+
+
+def _ranks(ranks: Sequence[Rank]) -> dict[str, Any]:
+    """Ranks and their test."""
+    statistic, p_value = uniformity(ranks)
+    return {
+        "statistic": statistic,
+        "p_value": p_value,
+        "demonstrations": [
+            {"id": one.id, "group": one.group, "log_likelihood": number(one.log_likelihood), "rank": one.rank}
+            for one in ranks
+        ],
+    }
