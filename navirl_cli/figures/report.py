@@ -30,14 +30,14 @@ def draw_report(
 
     Args:
         demonstrations: All.
-        parameters: Names and units of what was learnt.
+        parameters: Names and units of the learnt parameters.
         shown: The demonstration whose scene shows the policy, and this scene under the learnt reward.
         groups: Metrics, as :func:`navirl_cli.evaluation.compare.compare` gives them.
-        profiles: Profile likelihoods; none where none were followed.
+        profiles: Profile likelihoods; may be empty.
         folder: Where to write .png files.
 
     Returns:
-        The files by name.
+        The files by name: paths, policy, properties, and profile if there are profiles.
     """
     files = {name: folder / f"{name}.png" for name in ("paths", "policy", "properties", "profile")}
     figure, axes = new_figure(PAGE_IN)
