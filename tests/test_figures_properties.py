@@ -69,21 +69,17 @@ def test_panels_name_metric_and_unit_and_rows_group_and_count():
     assert bottom > top  # the first row stands at the top
 
 
-def test_every_row_of_metrics_is_a_bar_named_by_group_and_type_of_path():
-    kinds = (DRIVEN, ON_GRID, LEARNT, f"{LEARNT}, other", AVOIDANCE)
+def test_bars_are_named_by_group_and_type_of_path_and_baselines_have_none():
+    kinds = (DRIVEN, ON_GRID, LEARNT, AVOIDANCE)
     rows = [
         GroupMetrics("joystick", kind, count, values((1, 2, 3)), values((4, 5, 6))) for count, kind in enumerate(kinds)
     ]
     bars = bars_of(rows)
-    assert [one.label for one in bars] == [
-        "joystick",
-        "joystick, on grid",
-        "joystick, learnt",
-        "joystick, learnt, other",
-        "joystick, avoidance",
-    ]
-    assert [one.key for one in bars] == ["joystick", "joystick", LEARNT, LEARNT, "joystick"]
-    assert [(one.mean, one.std, one.count) for one in bars] == [(row.mean, row.std, row.count) for row in rows]
+    assert [one.label for one in bars] == ["joystick", "joystick, on grid", "joystick, learnt"]
+    assert [one.key for one in bars] == ["joystick", "joystick", LEARNT]
+    assert [(one.mean, one.std, one.count) for one in bars] == [(row.mean, row.std, row.count) for row in rows[:3]]
+    assert bars_of(rows, learnt_from={"joystick"}) == bars
+    assert bars_of(rows, learnt_from={"force"}) == bars[:1]
 
 
 def test_a_note_explains_bars_and_whiskers():

@@ -11,7 +11,8 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.compare import LEARNT, PERSON_RADIUS_M
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.figures.style import colour_of, look
 
 #: Width of a path and of the light border around it, points; more paths than these have this opacity.
@@ -30,6 +31,17 @@ class Overlay:
     key: str
     #: Each (k, 2) m, map frame.
     lines_m: Sequence[FloatArray]
+
+
+def overlays_of(demonstrations: Iterable[Demonstration], sampled_m: Sequence[FloatArray] = ()) -> list[Overlay]:
+    """Driven paths by group and, above them, paths sampled from a policy.
+
+    Args:
+        demonstrations: Those to draw.
+        sampled_m: Paths sampled from the policy, each (k, 2), m, map frame.
+    """
+    overlays = [Overlay(group, group, [one.xy_m for one in own]) for group, own in by_group(demonstrations).items()]
+    return [*overlays, *([Overlay("sampled from the policy", LEARNT, sampled_m)] if len(sampled_m) else [])]
 
 
 def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[Demonstration]:

@@ -1,7 +1,7 @@
 """Properties of paths by group, as bars (Fig. 7)."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -56,27 +56,27 @@ class DrawnProperties:
     bars: list[BarContainer]
 
 
-def bars_of(rows: Iterable[GroupMetrics]) -> list[PropertyBar]:
-    """Bars of measured paths, one for each row.
+def bars_of(rows: Iterable[GroupMetrics], learnt_from: Container[str] | None = None) -> list[PropertyBar]:
+    """Bars of driven and learnt paths.
+
+    Learnt paths go from cell to cell. They are compared with driven paths through the centres of cells.
 
     Args:
-        rows: Metrics by group and type of path, from top to bottom.
+        rows: Metrics by group and type of path, from top to bottom. Baselines have no bars.
+        learnt_from: Groups with bars of learnt paths and of driven paths through the centres of cells; None for all.
 
     Returns:
         The bars. Those of driven paths have the name of their group; others add the type of path. Learnt paths have
         their own colour, all others that of their group.
     """
-    suffix = {DRIVEN: "", ON_GRID: ", on grid"}
-    return [
-        PropertyBar(
-            row.group + suffix.get(row.kind, f", {row.kind}"),
-            LEARNT if row.kind.split(", ")[0] == LEARNT else row.group,
-            row.mean,
-            row.std,
-            row.count,
-        )
-        for row in rows
-    ]
+    bars = []
+    for row in rows:
+        if row.kind == DRIVEN:
+            bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
+        elif row.kind in {ON_GRID, LEARNT} and (learnt_from is None or row.group in learnt_from):
+            name, key = ("learnt", LEARNT) if row.kind == LEARNT else ("on grid", row.group)
+            bars.append(PropertyBar(f"{row.group}, {name}", key, row.mean, row.std, row.count))
+    return bars
 
 
 def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:

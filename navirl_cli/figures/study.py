@@ -8,7 +8,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
@@ -116,7 +115,7 @@ def _answers(bars: Sequence[Shares]) -> _Drawn:
 
 
 def _properties(study: Study) -> _Drawn:
-    bars = properties.bars_of(row for row in study.groups if row.kind == DRIVEN)
+    bars = properties.bars_of(study.groups, learnt_from=())
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     return figure, False

@@ -84,7 +84,7 @@ def _bars(
     """Bars of driven paths by group, and of learnt paths in the groups from which the reward was learnt."""
     import numpy as np
 
-    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
+    from navirl_cli.evaluation.compare import LEARNT, compare
     from navirl_cli.evaluation.drawn import Precision
     from navirl_cli.evaluation.groups import group_of
     from navirl_cli.figures.properties import bars_of
@@ -100,7 +100,4 @@ def _bars(
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     for note in result.notes:
         say(note)
-    # Learnt paths go from cell to cell. They are compared with driven paths through the centres of cells.
-    return bars_of(
-        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in taught)
-    )
+    return bars_of(result.groups, taught)

@@ -70,19 +70,14 @@ class Sight:
         """Paths to draw over the map, driven ones below."""
         import numpy as np
 
-        from navirl_cli.evaluation.compare import LEARNT
-        from navirl_cli.evaluation.groups import by_group
-        from navirl_cli.figures.overlay import Overlay, alike
+        from navirl_cli.figures.overlay import alike, overlays_of
         from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 
-        overlays = []
-        if DEMOS in self.overlay:
-            groups = by_group(alike(self.demonstrations, self.one))
-            overlays += [Overlay(group, group, [one.xy_m for one in own]) for group, own in groups.items()]
+        sampled_m: list[FloatArray] = []
         if SAMPLES in self.overlay:
             paths = sample_paths(self.policy, self.scene.start, self.samples, np.random.default_rng(self.seed))
-            overlays.append(Overlay("sampled from the policy", LEARNT, sampled_lines_m(self.policy, paths)))
-        return overlays
+            sampled_m = sampled_lines_m(self.policy, paths)
+        return overlays_of(alike(self.demonstrations, self.one) if DEMOS in self.overlay else (), sampled_m)
 
 
 def scene_options(function: Function) -> Function:
