@@ -17,7 +17,7 @@ COMMANDS = {
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and how groups of them differ.",
-    "plot": "Draw paths, policy, reward, path properties and how a fit went.",
+    "plot": "Draw paths, policies, rewards, path properties and fits.",
     "report": "Tell what was learnt, in one HTML page without anything from elsewhere.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",

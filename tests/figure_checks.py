@@ -1,4 +1,4 @@
-"""What tests ask of a drawn figure: its texts and where they stand, its cells, its colours."""
+"""Checks of a drawn figure: its texts, its cells, its colours."""
 
 from itertools import combinations
 from unittest.mock import patch
@@ -38,7 +38,7 @@ def labelled(axes, label):
 
 
 def drawn_texts(figure):
-    """Every text that is drawn, and where."""
+    """Every text that is drawn, with its box."""
     drawn = {}
     draw = Text.draw
 
@@ -52,8 +52,8 @@ def drawn_texts(figure):
     return drawn
 
 
-def assert_nothing_touches(figure):
-    """No two texts overlap, and none leaves the paper."""
+def assert_no_overlap(figure):
+    """No texts overlap, and none is clipped."""
     figure.set_dpi(DPI)
     drawn = [(text.get_text(), box) for text, box in drawn_texts(figure).items()]
     assert len(drawn) > 3

@@ -1,4 +1,4 @@
-"""What figures of a map draw: paths, obstacles, people, and the part of the map that is worth its paper."""
+"""Figures of paths: paths, obstacles, people, and the view of the map."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_a_legend_is_as_wide_as_its_panel_at_most():
         assert legend.y1 < axes[0].xaxis.label.get_window_extent().y0
 
 
-def test_contact_is_drawn_thicker_on_the_stretch_it_lasted():
+def test_sections_in_contact_are_thicker():
     drawn = draw_paths(one_axes(), [demonstration(contacts=[(2.05, 4.0), (9.0, 20.0)])])
     first, second = drawn.contacts
     np.testing.assert_allclose(first.get_xdata()[[0, -1]], [-3.0 + 0.6 * 2.05, -3.0 + 0.6 * 4.0])
@@ -73,7 +73,7 @@ def test_contact_is_drawn_thicker_on_the_stretch_it_lasted():
     assert "in contact" in legend_texts(drawn.axes)
 
 
-def test_obstacles_lie_where_the_map_has_them_and_free_cells_stay_white():
+def test_obstacles_are_where_the_map_has_them_and_free_cells_are_white():
     grid = room()
     drawn = draw_paths(one_axes(), [demonstration(grid=grid)])
     (image,) = drawn.obstacles
@@ -84,7 +84,7 @@ def test_obstacles_lie_where_the_map_has_them_and_free_cells_stay_white():
     assert image.to_rgba(image.get_array())[20, 20, 3] == 0.0
 
 
-def test_what_one_path_drove_through_is_free_on_the_shared_map():
+def test_cells_that_one_path_drove_through_are_free_on_the_shared_map():
     grid = room()
     freed = grid.freed(np.array([[50, 2]]))
     drawn = draw_paths(one_axes(), [demonstration(grid=grid), demonstration(grid=freed)])
@@ -107,7 +107,7 @@ def test_people_and_robot_are_drawn_to_scale_once():
     drawn = draw_paths(one_axes(), ones)
     assert [circle.center for circle in drawn.people] == [(0.0, 0.1), (1.0, -1.0)]
     assert {circle.radius for circle in drawn.people} == {0.25}
-    assert "person (line as path's)" in legend_texts(drawn.axes)
+    assert "person (line style of path)" in legend_texts(drawn.axes)
     (robot,) = drawn.robots
     np.testing.assert_allclose(robot.center, ones[0].xy_m[0])
     assert robot.radius == 0.3
@@ -128,7 +128,7 @@ def test_people_of_different_trials_do_not_hide_each_other_or_a_path(count):
     assert drawn.obstacles[0].get_zorder() < below < drawn.lines[0].get_zorder() < above
 
 
-def test_starts_apart_have_an_outline_each():
+def test_starts_at_different_places_have_an_outline_each():
     shifted = Demonstration(**{**vars(demonstration()), "xy_m": demonstration().xy_m + np.array([0.0, 0.4])})
     drawn = draw_paths(one_axes(), [demonstration(), shifted])
     assert len(drawn.robots) == 2
@@ -136,7 +136,7 @@ def test_starts_apart_have_an_outline_each():
     np.testing.assert_allclose(labelled(drawn.axes, "goal").get_xydata(), [(3.0, 0.05)])
 
 
-def test_nobody_is_not_in_the_legend():
+def test_without_people_the_legend_has_no_person():
     drawn = draw_paths(one_axes(), [demonstration(people_m=[])])
     assert drawn.people == []
     assert "person" not in legend_texts(drawn.axes)
@@ -170,16 +170,16 @@ def test_a_map_of_the_paths_size_is_shown_whole():
 
 
 @pytest.mark.parametrize("beyond", [(50.0, 0.0), (-50.0, 30.0), (6.0, -90.0)])
-def test_points_beyond_the_map_do_not_widen_it(beyond):
+def test_points_outside_of_the_map_do_not_widen_the_view(beyond):
     assert window_around([room()], np.array([(-3.0, 0.0), (3.0, 0.0), beyond])) == pytest.approx(room().extent_m)
 
 
-def test_a_crop_towards_a_point_beyond_the_map_ends_with_the_map():
+def test_a_crop_towards_a_point_outside_of_the_map_ends_with_the_map():
     points = np.array([(-1.0, 0.0), (2.0, 0.5), (50.0, 0.0)])
     assert window_around([room(300, 300, (-15.0, -15.0))], points) == pytest.approx((-2.5, 15.0, -1.5, 2.0))
 
 
-def test_a_goal_far_beyond_the_map_leaves_the_figure_as_it_is():
+def test_a_goal_far_outside_of_the_map_does_not_change_the_figure():
     far = Demonstration(**{**vars(demonstration()), "goal_m": (50.0, 0.0)})
     sizes = []
     for one in (demonstration(), far):

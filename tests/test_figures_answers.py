@@ -1,10 +1,10 @@
-"""What the figure of a questionnaire draws, and that no two of its texts touch."""
+"""The figure of a questionnaire's answers."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches, layouts
+from figure_checks import assert_no_overlap, layouts
 from matplotlib.colors import to_hex
 
 from navirl_cli.errors import DemonstrationError
@@ -105,11 +105,11 @@ def test_the_axis_counts_percent_to_both_sides():
         (7, COLUMN_IN, [LONG, "Fun?", LONG + LONG], ["force", "joystick"]),
     ),
 )
-def test_no_two_texts_touch_and_bars_keep_their_room(questions, modalities, levels, width_in):
+def test_no_texts_overlap_and_bars_keep_their_height(questions, modalities, levels, width_in):
     rng = np.random.default_rng(0)
     bars = [share(rng.integers(0, 100, levels), question, one) for question in questions for one in modalities]
     figure, drawn = asked(bars, width_in)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     assert drawn.axes.get_window_extent().width > 0.3 * figure.bbox.width
     heights = [patch.get_window_extent().height / figure.dpi for patch in drawn.levels[0].patches]
     assert 0.11 < min(heights) <= max(heights) < 0.16  # inches, as planned, whatever the number of bars

@@ -1,4 +1,4 @@
-"""What figures of numbers by cell draw: the propagated policy and the state reward."""
+"""Figures of values by cell: the propagated policy and the state reward."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_the_reward_is_drawn_by_cell_on_a_linear_scale():
     near = (a_scene.deviation_m <= REACH_M) | (np.hypot(*(xy - a_scene.people_m[0]).T) <= REACH_M)
     assert 0 < near.sum() < a_scene.lattice.size
     assert (drawn.image.norm.vmin, drawn.image.norm.vmax) == (reward[near].min(), reward[near].max())
-    assert drawn.colour_bar.ax.get_ylabel() == "state reward per step\n(without cost of way)"
+    assert drawn.colour_bar.ax.get_ylabel() == "state reward per step\n(without path length)"
     assert "robot" not in legend_texts(drawn.axes)
 
 
@@ -91,7 +91,7 @@ def test_a_person_off_the_nominal_path_is_within_the_scale():
 @pytest.mark.parametrize(
     ("beyond", "extend"), [((), "neither"), ((-9.0,), "min"), ((9.0,), "max"), ((-9.0, 9.0), "both")]
 )
-def test_the_bar_of_the_reward_is_pointed_where_cells_lie_beyond_it(beyond, extend):
+def test_the_bar_of_the_reward_is_pointed_where_cells_are_outside_of_its_range(beyond, extend):
     a_scene = scene(people_m=[])
     reward = np.linspace(-1.0, 1.0, a_scene.lattice.size)
     far = np.flatnonzero(a_scene.deviation_m > REACH_M)
@@ -172,6 +172,6 @@ def test_two_figures_of_a_scene_can_show_the_same_window():
 
 
 @pytest.mark.parametrize("draw", [draw_policy, draw_reward])
-def test_numbers_that_are_not_one_a_state_are_refused(draw):
-    with pytest.raises(ValueError, match=r"one number for each of \d+ states is needed, found shape \(3,\)"):
+def test_values_that_are_not_one_for_each_state_are_refused(draw):
+    with pytest.raises(ValueError, match=r"expected one value for each of \d+ states, found shape \(3,\)"):
         draw(one_axes(), scene(), np.zeros(3))

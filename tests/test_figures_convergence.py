@@ -1,8 +1,8 @@
-"""What the figure of a search draws: log-likelihood and parameters over its iterations."""
+"""The figure of a fit's convergence: log-likelihood and parameters over the iterations."""
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches, layouts
+from figure_checks import assert_no_overlap, layouts
 
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.sheet import new_figure
@@ -13,7 +13,7 @@ PARAMETERS = Reward.named({}).parameters
 
 
 def search(count=8):
-    """A way in (count,) log-likelihoods and (count, 4) parameters."""
+    """A search in (count,) log-likelihoods and (count, 4) parameters."""
     at = 1 - 0.5 ** np.arange(count)
     return -307.75 + 41.88 * at, np.array([-30.0, -1.0, -2.0, 2.0]) + np.outer(at, [-19.0, -0.8, -4.7, -1.1])
 
@@ -34,7 +34,7 @@ def test_every_iteration_is_drawn_from_the_start_on():
     assert drawn_of(2000)[1].lines[0].get_marker() == ""
 
 
-def test_titles_say_where_it_ended_with_units():
+def test_titles_give_the_final_values_with_units():
     _, drawn = drawn_of()
     titles = [panel.get_title().replace("\N{MINUS SIGN}", "-") for panel in drawn.axes]
     assert titles[0] == "log-likelihood = -266.2 nats"
@@ -51,16 +51,16 @@ def test_the_axis_counts_whole_iterations():
 
 
 @pytest.mark.parametrize(("count", "width_in"), layouts((1, COLUMN_IN), (8, PAGE_IN), (2000, COLUMN_IN)))
-def test_no_two_texts_touch(width_in, count):
+def test_no_texts_overlap(width_in, count):
     figure, _ = drawn_of(count, width_in)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
 
 
-def test_a_parameter_that_stayed_is_a_straight_line_at_its_value():
+def test_a_constant_parameter_is_a_straight_line():
     theta = search()[1]
     theta[:, 3] = 1.5
     figure, drawn = drawn_of(theta=theta)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     low, high = drawn.axes[4].get_ylim()
     assert low < 1.5 < high
     assert drawn.axes[4].get_title() == r"$\sigma_p$ = 1.5 1/m²"

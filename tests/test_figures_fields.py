@@ -1,8 +1,8 @@
-"""What figures of the whole field draw: the soft value with its contours, and the most likely moves."""
+"""Figures of all cells: the soft value with its contours, and the most likely moves."""
 
 import numpy as np
 import pytest
-from figure_checks import assert_cells, assert_nothing_touches, legend_texts
+from figure_checks import assert_cells, assert_no_overlap, legend_texts
 from figure_factory import PUBLISHED, demonstration, one_axes, room, scene
 from matplotlib.colors import to_hex
 
@@ -28,7 +28,7 @@ def test_the_value_is_drawn_by_cell_up_to_0_at_the_goal():
     assert legend_texts(drawn.axes) == ["nominal path", "start", "goal", "robot", "person", "obstacle, inflated"]
 
 
-def test_contours_lie_where_the_value_is_theirs():
+def test_contours_are_where_the_value_is_theirs():
     drawn = draw_value(one_axes(), SCENE, POLICY.value)
     levels = drawn.contours.levels
     assert 3 <= len(levels) <= 13
@@ -56,7 +56,7 @@ def test_the_value_of_a_window_spans_what_it_shows():
     assert drawn.contours.levels.max() < shown.max()
 
 
-def test_contours_can_be_told_from_every_value():
+def test_contours_differ_from_every_colour_of_a_value():
     for name in LOOKS:
         with styled(name):
             drawn = draw_value(one_axes(), SCENE, POLICY.value)
@@ -69,7 +69,7 @@ def arrows_of(drawn):
     return np.stack([drawn.arrows.U, drawn.arrows.V], axis=1)
 
 
-def test_arrows_point_to_the_most_likely_move_and_are_as_long_as_it_is_sure():
+def test_arrows_point_to_the_most_likely_move_and_are_as_long_as_it_is_probable():
     drawn = draw_actions(one_axes(), SCENE, POLICY.probability, window_m=(-1.0, 1.0, -0.5, 1.0))
     assert len(drawn.states) > 100
     best = POLICY.probability[drawn.states].argmax(axis=1)
@@ -85,7 +85,7 @@ def test_arrows_point_to_the_most_likely_move_and_are_as_long_as_it_is_sure():
 
 
 @pytest.mark.parametrize(("width_in", "every"), [(COLUMN_IN, 3), (PAGE_IN, 2)])
-def test_arrows_thin_out_where_cells_are_small(width_in, every):
+def test_small_cells_have_fewer_arrows(width_in, every):
     drawn = draw_actions(one_axes(width_in), SCENE, POLICY.probability)
     trim_height(drawn.axes.figure)
     cells = SCENE.lattice.cells[drawn.states]
@@ -97,7 +97,7 @@ def test_arrows_thin_out_where_cells_are_small(width_in, every):
     assert longest < every * 0.1
     pixels = drawn.axes.transData.transform([(0.0, 0.0), (every * 0.1, 0.0)])
     assert np.ptp(pixels[:, 0]) / drawn.axes.figure.dpi > 0.08  # inches from arrow to arrow
-    assert_nothing_touches(drawn.axes.figure)
+    assert_no_overlap(drawn.axes.figure)
 
 
 def test_the_goal_has_no_arrow_and_no_arrow_leaves_the_window():
@@ -112,8 +112,8 @@ def test_the_goal_has_no_arrow_and_no_arrow_leaves_the_window():
     assert x1 - x0 < 20.0
 
 
-def test_what_is_not_one_row_of_moves_a_state_is_refused():
+def test_probabilities_that_are_not_one_row_for_each_state_are_refused():
     with pytest.raises(ValueError, match=r"probabilities of moves need the shape \(\d+, 8\), found \(3, 8\)"):
         draw_actions(one_axes(), SCENE, np.zeros((3, 8)))
-    with pytest.raises(ValueError, match=r"one number for each of \d+ states is needed, found shape \(3,\)"):
+    with pytest.raises(ValueError, match=r"expected one value for each of \d+ states, found shape \(3,\)"):
         draw_value(one_axes(), SCENE, np.zeros(3))

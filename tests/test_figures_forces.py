@@ -1,11 +1,11 @@
-"""What the figure of a trial's forces draws: arrows to scale along the path, and forces over time with contacts."""
+"""The figure of a trial's forces: arrows to scale along the path, and forces over time with contacts."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches
+from figure_checks import assert_no_overlap
 from figure_factory import demonstration
 from matplotlib.colors import to_hex
 
@@ -51,7 +51,7 @@ def test_arrows_start_on_the_path_in_contact_and_are_the_force_to_scale():
     assert to_hex(drawn.arrows.get_facecolor()[0]) == COLOURS["force, cycle 2"].lower()
 
 
-def test_an_arrow_of_a_round_force_tells_the_scale():
+def test_an_arrow_of_a_round_force_shows_the_scale():
     _, _, drawn = both()
     (reference,) = [one for one in drawn.map.axes.collections if one is not drawn.arrows]
     assert drawn.reference_n == 10.0
@@ -69,13 +69,13 @@ def test_components_and_size_are_drawn_over_time_with_units():
     for line, values in zip(drawn.components, one.force_n.T, strict=True):
         np.testing.assert_array_equal(line.get_xydata(), np.stack([one.t_s, values], axis=1))
     np.testing.assert_allclose(drawn.size.get_ydata(), np.hypot(*one.force_n.T))
-    assert drawn.over_time.get_xlabel() == "time since the trial's start [s]"
+    assert drawn.over_time.get_xlabel() == "time since start of trial [s]"
     assert drawn.over_time.get_ylabel() == "force [N]"
     assert drawn.over_time.get_xlim() == (0.0, 10.0)
     assert drawn.size.get_color() == COLOURS["force, cycle 2"]
     assert drawn.map.axes.get_title() == "p01/3: force, cycle 2"
     names = {text.get_text() for text in drawn.legend.get_texts()}
-    shown = {"force along x (map)", "force along y (map)", "size of force", "contact (peak, impulse)"}
+    shown = {"force along x (map)", "force along y (map)", "magnitude of force", "contact (peak, impulse)"}
     assert names == shown | {"start", "goal", "robot", "person", "obstacle, inflated"}
 
 
@@ -99,10 +99,10 @@ def test_contacts_are_shaded_from_start_to_end_and_named_above_the_curves():
         (PAGE_IN, ((2.0, 4.0), (9.6, 10.0))),
     ],
 )
-def test_no_two_texts_touch_however_near_the_contacts_and_map_and_time_are_as_wide(width_in, spans):
+def test_no_texts_overlap_with_contacts_near_each_other_and_both_panels_are_equally_wide(width_in, spans):
     figure, drawn = drawn_of(pushed(spans), width_in)
     trim_height(figure)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     widths = [part.get_window_extent().width for part in (drawn.map.axes, drawn.over_time)]
     assert widths[0] == pytest.approx(widths[1], rel=0.02)
     assert widths[0] > 0.8 * figure.bbox.width
@@ -117,7 +117,7 @@ def test_a_cropped_map_holds_path_and_arrows():
     assert high - low < 3.0  # the whole is 4 m high
 
 
-def test_a_trial_in_which_nobody_pushed_shows_that_its_forces_are_small():
+def test_a_trial_without_contact_has_an_axis_of_5_newtons():
     noise = np.random.default_rng(0).normal(0, 0.05, (101, 2))
     one = replace(demonstration(Condition.JOYSTICK), force_n=noise, contacts=())
     _, drawn = drawn_of(one)
@@ -131,6 +131,7 @@ def test_a_trial_in_which_nobody_pushed_shows_that_its_forces_are_small():
 def test_a_trial_without_a_wrench_is_refused():
     for unknown in (replace(pushed(), force_n=None), replace(pushed(), contacts=None)):
         with pytest.raises(
-            DemonstrationError, match=r"^demonstration p01/3: no forces to draw, for its log holds no wr"
+            DemonstrationError,
+            match=r"^demonstration p01/3: no forces to draw, because its log holds no wrench; choose another with `",
         ):
             drawn_of(unknown)

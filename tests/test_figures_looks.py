@@ -30,7 +30,7 @@ def contrast(one, other):
     return (high + 0.05) / (low + 0.05)
 
 
-def test_colours_keep_their_hue_in_the_dark_and_can_be_seen():
+def test_colours_keep_their_hue_in_the_dark_and_are_visible():
     assert set(DARK_COLOURS) == set(COLOURS)
     for key, colour in DARK_COLOURS.items():
         assert contrast(colour, LOOKS["dark"].paper) > GRAPHICS, key
@@ -39,7 +39,7 @@ def test_colours_keep_their_hue_in_the_dark_and_can_be_seen():
             assert abs(hues[0] - hues[1]) < 8, key
 
 
-def test_groups_are_apart_in_the_dark_for_every_colour_vision():
+def test_groups_are_distinct_in_the_dark_for_every_colour_vision():
     groups = ["force, cycle 1", "force, cycle 2", "force, later cycles", "joystick", "autonomous", "learnt"]
     for one, other in combinations(groups, 2):
         for sight, matrix in SIGHTS.items():
@@ -47,7 +47,7 @@ def test_groups_are_apart_in_the_dark_for_every_colour_vision():
             assert apart > 18, (one, other, sight)
 
 
-def test_letters_can_be_read_in_every_look():
+def test_letters_are_legible_in_every_look():
     for name, one in LOOKS.items():
         assert contrast(one.ink, one.paper) > 2 * TEXT, name
         assert contrast(one.ink, one.obstacle) > TEXT, name  # a scale bar may stand on an obstacle
@@ -80,7 +80,7 @@ def test_paths_are_drawn_light_on_near_black():
         assert to_hex(drawn.axes.spines["left"].get_edgecolor()) == dark.ink.lower()
 
 
-def test_unlikely_cells_are_as_the_paper_and_likely_ones_stand_out_in_every_look():
+def test_unlikely_cells_have_the_background_s_colour_and_likely_ones_stand_out():
     for name, one in LOOKS.items():
         with styled(name):
             image = draw_policy(one_axes(), *scene_and_visits()).image
@@ -90,7 +90,7 @@ def test_unlikely_cells_are_as_the_paper_and_likely_ones_stand_out_in_every_look
         assert apart == sorted(apart)
 
 
-def test_people_on_colours_have_ink_and_a_border_of_paper():
+def test_people_on_colours_have_a_border_of_the_background_s_colour():
     with styled("dark"):
         (person,) = draw_reward(one_axes(), scene(), PUBLISHED.by_cell(scene())).people
     (halo,) = person.get_path_effects()

@@ -1,11 +1,11 @@
-"""What stands on every map: scale bar, goals that are not shown, people beside their paths, paths over numbers."""
+"""Marks on every map: scale bar, goals outside of the view, people, paths over values."""
 
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches, legend_texts
+from figure_checks import assert_no_overlap, legend_texts
 from figure_factory import PUBLISHED, demonstration, one_axes, room, scene, scene_and_visits
 
 from navirl_cli.demos.demonstration import Condition
@@ -30,7 +30,7 @@ def test_a_scale_bar_is_one_metre_or_a_round_number_that_fits(width_m, expected)
 
 
 @pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
-def test_the_scale_bar_is_true_says_its_length_and_hides_no_path(width_in):
+def test_the_scale_bar_is_to_scale_and_labelled_and_hides_no_path(width_in):
     one = demonstration(aside_m=-1.2)
     drawn = draw_paths(one_axes(width_in), [one])
     trim_height(drawn.axes.figure)
@@ -50,8 +50,8 @@ def test_the_scale_bar_is_true_says_its_length_and_hides_no_path(width_in):
 
 
 def test_the_scale_bar_takes_the_corner_that_is_free():
-    def corner(*ways_m):
-        ones = [replace(demonstration(), xy_m=np.repeat(way, [50, 51], 0)) for way in ways_m]
+    def corner(*corners_m):
+        ones = [replace(demonstration(), xy_m=np.repeat(corners, [50, 51], 0)) for corners in corners_m]
         drawn = draw_paths(one_axes(), ones, window_m=room().extent_m)
         x, y = drawn.marks.scale_bar.get_xydata().mean(axis=0)
         return bool(x > 0), bool(y > 0)
@@ -64,7 +64,7 @@ def test_the_scale_bar_takes_the_corner_that_is_free():
     assert corner(south, west) == (True, True)
 
 
-def test_a_goal_beyond_the_map_is_an_arrow_at_its_border():
+def test_a_goal_outside_of_the_map_is_an_arrow_at_its_border():
     far = replace(demonstration(), goal_m=(50.0, 30.0))
     drawn = draw_paths(one_axes(), [demonstration(), far])
     assert drawn.marks.goals.get_xydata().tolist() == [[3.0, 0.05]]
@@ -77,17 +77,17 @@ def test_a_goal_beyond_the_map_is_an_arrow_at_its_border():
     tip, *tail, _ = arrow.get_marker()
     assert tip == pytest.approx(np.array([50.0 - x, 30.0 - y]) / np.hypot(50.0 - x, 30.0 - y))
     assert np.mean(tail, axis=0) == pytest.approx(-tip)
-    assert {"goal", "goal beyond"} < set(legend_texts(drawn.axes))
+    assert {"goal", "goal outside"} < set(legend_texts(drawn.axes))
 
 
 def test_a_goal_that_is_not_shown_is_not_in_the_legend():
     texts = legend_texts(draw_paths(one_axes(), [replace(demonstration(), goal_m=(50.0, 0.0))]).axes)
-    assert "goal beyond" in texts
+    assert "goal outside" in texts
     assert "goal" not in texts
-    assert "goal beyond" not in legend_texts(draw_paths(one_axes(), [demonstration()]).axes)
+    assert "goal outside" not in legend_texts(draw_paths(one_axes(), [demonstration()]).axes)
 
 
-def test_people_at_different_places_have_the_line_of_their_paths():
+def test_people_at_different_places_have_the_line_style_of_their_paths():
     ones = [demonstration(aside_m=aside, people_m=[(x, 0.1)]) for aside, x in ((0.5, 0.0), (0.4, 1.0), (0.3, 0.0))]
     drawn = draw_paths(one_axes(), ones)
     kinds = [line._dash_pattern for line in drawn.lines]
@@ -96,17 +96,17 @@ def test_people_at_different_places_have_the_line_of_their_paths():
     assert [one.center[0] for one in (first, second)] == [0.0, 1.0]
     assert first.get_linestyle() != second.get_linestyle()
     assert drawn.lines[0].get_linestyle() == "-"
-    assert "person (line as path's)" in legend_texts(drawn.axes)
+    assert "person (line style of path)" in legend_texts(drawn.axes)
 
 
-def test_who_stands_beside_all_paths_has_a_plain_line_and_so_have_paths_with_nobody():
+def test_people_of_all_trials_and_paths_without_people_have_solid_lines():
     both = demonstration(people_m=[(0.0, 0.1), (1.0, -1.0)])
     drawn = draw_paths(one_axes(), [both, demonstration(people_m=[(0.0, 0.1)]), demonstration(people_m=[])])
     assert [line.is_dashed() for line in drawn.lines] == [False, True, False]
     assert [one.get_linestyle() in {"-", "solid"} for one in drawn.people] == [True, True]
 
 
-def test_one_place_or_too_many_places_leave_lines_plain():
+def test_lines_are_solid_with_one_place_or_too_many_places():
     for places in ([0.0, 0.001], [0.0, 0.5, 1.0, 1.5, 2.0]):
         drawn = draw_paths(one_axes(), [demonstration(people_m=[(x, 0.1)]) for x in places])
         assert not any(line.is_dashed() for line in drawn.lines)
@@ -119,7 +119,7 @@ def test_a_person_who_is_not_shown_is_not_in_the_legend():
     assert "person" not in legend_texts(axes)
 
 
-def test_a_cropped_map_ends_beyond_paths_and_the_people_near_them():
+def test_a_cropped_map_includes_paths_and_the_people_near_them():
     near, far = (0.0, 1.5), (30.0, 30.0)
     grid = room(800, 800, (-40.0, -40.0))
     one = demonstration(grid=grid, people_m=[near, far], aside_m=0.0)
@@ -131,7 +131,7 @@ def test_a_cropped_map_ends_beyond_paths_and_the_people_near_them():
     assert "person" in legend_texts(drawn.axes)  # the near one alone
 
 
-def test_a_crop_ends_with_the_map_even_where_the_map_is_small():
+def test_a_crop_ends_with_a_small_map():
     assert cropped_to([room()], np.array([(-3.9, 0.0), (3.0, 0.1)]), np.empty((0, 2))) == pytest.approx(
         (-4.0, 3.5, -0.5, 0.6)
     )
@@ -149,11 +149,11 @@ def test_a_scene_is_cropped_to_where_its_policy_leads_and_to_paths_over_it():
 
 def overlays():
     lines = [demonstration(aside_m=aside).xy_m for aside in (0.5, 0.7)]
-    return [Overlay("force", "force", lines), Overlay("drawn from the policy", "learnt", lines * 6)]
+    return [Overlay("force", "force", lines), Overlay("sampled from the policy", "learnt", lines * 6)]
 
 
 @pytest.mark.parametrize("draw", ["policy", "reward"])
-def test_paths_lie_thin_over_the_numbers_in_the_colour_of_their_group(draw):
+def test_paths_over_values_are_thin_and_have_the_colour_of_their_group(draw):
     a_scene, visits = scene_and_visits()
     axes, paths = one_axes(), overlays()
     if draw == "policy":
@@ -161,21 +161,21 @@ def test_paths_lie_thin_over_the_numbers_in_the_colour_of_their_group(draw):
     else:
         drawn = draw_reward(axes, a_scene, PUBLISHED.by_cell(a_scene), overlays=paths)
     expected = [line for kind in paths for line in kind.lines_m]
-    for line, way in zip(drawn.overlays, expected, strict=True):
-        np.testing.assert_array_equal(line.get_xydata(), way)
+    for line, path in zip(drawn.overlays, expected, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), path)
     assert [line.get_color() for line in drawn.overlays] == [COLOURS["force"]] * 2 + [COLOURS["learnt"]] * 12
     assert drawn.obstacles.get_zorder() < drawn.nominal.get_zorder() < drawn.overlays[0].get_zorder()
     assert drawn.overlays[0].get_zorder() < drawn.people[0].get_zorder()
     assert max(line.get_linewidth() for line in drawn.overlays) < drawn.nominal.get_linewidth()
     assert drawn.overlays[-1].get_alpha() < drawn.overlays[0].get_alpha()  # many let through what is below
-    assert legend_texts(axes)[:2] == ["force (n = 2)", "drawn from the policy (n = 12)"]
+    assert legend_texts(axes)[:2] == ["force (n = 2)", "sampled from the policy (n = 12)"]
 
 
-def test_nothing_touches_on_a_map_with_everything():
+def test_no_texts_overlap_on_a_map_with_everything():
     a_scene, visits = scene_and_visits()
     drawn = draw_policy(one_axes(), a_scene, visits, overlays=overlays(), robot_radius_m=0.3, title="policy")
     trim_height(drawn.axes.figure)
-    assert_nothing_touches(drawn.axes.figure)
+    assert_no_overlap(drawn.axes.figure)
 
 
 def test_demonstrations_of_a_scene_have_its_map_people_start_and_goal():
@@ -198,7 +198,7 @@ def test_demonstrations_of_a_scene_have_its_map_people_start_and_goal():
     assert scene() is not None
 
 
-def test_a_kind_of_line_means_one_place_in_all_panels():
+def test_a_line_style_means_one_place_in_all_panels():
     here, there = (demonstration(people_m=[(x, 0.1)]) for x in (0.0, 1.0))
     _, axes = new_figure(PAGE_IN, panels=2)
     drawn = draw_path_panels(axes, [("both", [here, there]), ("there", [there])])

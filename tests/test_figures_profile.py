@@ -1,4 +1,4 @@
-"""What the figure of a profile likelihood draws."""
+"""The figure of profile likelihoods."""
 
 from dataclasses import replace
 from functools import cache
@@ -122,7 +122,7 @@ def test_the_interval_is_shaded_from_end_to_end():
     assert band.get_alpha() == 0.15
 
 
-def test_an_open_end_is_shaded_to_where_it_was_followed_and_called_open():
+def test_an_open_end_is_shaded_to_the_last_value_and_labelled_open():
     profile = parabola()
     cut = part_of(profile, slice(0, 6), upper=None)
     axes = drawn(cut)
@@ -147,7 +147,7 @@ def test_labels_name_symbol_unit_and_level():
     assert drawn(parabola(name="beta"), "s").get_xlabel() == "beta [s]"
 
 
-def test_the_axes_hold_the_curve_down_to_a_little_below_the_interval():
+def test_the_axes_end_a_little_below_the_interval():
     profile = parabola()
     axes = drawn(profile)
     low, high = axes.get_ylim()
@@ -169,12 +169,15 @@ def test_a_curve_on_one_side_of_a_bound():
 
 def test_a_flat_profile_is_refused():
     flat = replace(parabola(), relative=np.zeros(9))
-    with pytest.raises(ArtefactError, match=r"^the profile of sigma_p is flat: there is nothing to draw$"):
+    with pytest.raises(
+        ArtefactError,
+        match=r"^profile of sigma_p: expected a log-likelihood with a maximum, found a flat one; the demonstrations do",
+    ):
         drawn(flat)
 
 
 @pytest.mark.parametrize(("order", "count", "width_in"), EVERY)
-def test_no_text_is_drawn_over_another_or_cut(order, count, width_in):
+def test_no_texts_overlap_or_are_clipped(order, count, width_in):
     figure = laid_out(order, count, width_in)
     assert len(figure.axes) == count
     assert figure.get_size_inches()[0] == width_in
@@ -191,7 +194,7 @@ def test_no_text_is_drawn_over_another_or_cut(order, count, width_in):
 
 
 @pytest.mark.parametrize(("count", "width_in"), layouts(*ROOM))
-def test_panels_are_as_large_as_each_other_and_low_enough_for_a_paper(count, width_in):
+def test_panels_are_of_one_size_and_low_enough_for_a_paper(count, width_in):
     figure = laid_out("common", count, width_in)
     inches = [axes.bbox.size / figure.dpi for axes in figure.axes]
     assert np.ptp(inches, axis=0) == pytest.approx(0.0, abs=1e-6)
@@ -201,7 +204,7 @@ def test_panels_are_as_large_as_each_other_and_low_enough_for_a_paper(count, wid
     assert 1.5 < figure.get_size_inches()[1] <= 2.6
 
 
-def test_titles_beside_each_other_have_two_lines():
+def test_titles_side_by_side_have_two_lines():
     figure = laid_out("common", 4, PAGE_IN)
     titles = [axes.get_title() for axes in figure.axes]
     assert titles[0] == "$\\sigma_p$ = 0.934\n(0.385 to 1.48)"
@@ -253,19 +256,19 @@ def test_ticks_are_few(order, count, width_in):
 @pytest.mark.parametrize(
     ("count", "width_in", "message"),
     [
-        (3, COLUMN_IN, "3 profiles side by side cannot be read in 3.5 in, which has room for 2: use --wide, or fewer"),
-        (4, COLUMN_IN, "4 profiles side by side cannot be read in 3.5 in, which has room for 2: use --wide, or fewer"),
-        (5, COLUMN_IN, "5 profiles side by side cannot be read in 3.5 in, which has room for 2: use fewer"),
-        (5, PAGE_IN, "5 profiles side by side cannot be read in 7.16 in, which has room for 4: use fewer"),
+        (3, COLUMN_IN, "3 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or fit"),
+        (4, COLUMN_IN, "4 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or fit"),
+        (5, COLUMN_IN, "5 profiles side by side are not legible in 3.5 in: expected 2 at most; fit"),
+        (5, PAGE_IN, "5 profiles side by side are not legible in 7.16 in: expected 4 at most; fit"),
     ],
 )
-def test_more_profiles_than_have_room_are_refused(count, width_in, message):
+def test_more_profiles_than_fit_are_refused(count, width_in, message):
     with pytest.raises(ArtefactError) as caught:
         draw_profiles([*common(), parabola()][:count], UNITS, width_in)
-    assert str(caught.value) == f"{message} --profile in navirl fit"
+    assert str(caught.value) == f"{message} again with fewer parameters in `profile`"
 
 
-def test_the_level_stands_inside_the_panel_even_beside_an_end():
+def test_the_level_is_inside_the_panel_also_near_an_end():
     for keep, side in ((slice(4, None), "left"), (slice(0, 5), "right"), (slice(None), "right")):
         (axes,) = sheet([part_of(parabola(), keep)], COLUMN_IN).axes
         (label,) = axes.texts
@@ -308,16 +311,16 @@ def test_levels_that_can_be_drawn_are(plot, level):
 
 
 @pytest.mark.parametrize("level", [0.0, -0.5, 0.99991, 0.9999999999999999, 1.0, 95.0])
-def test_levels_of_which_there_is_no_interval_are_refused_by_the_schema(plot, level):
+def test_levels_without_an_interval_are_refused_by_the_schema(plot, level):
     result = plot([replace(parabola(), level=level)])
     assert result.exit_code == 1
     found = "less than or equal to the minimum of 0" if level <= 0 else "greater than the maximum of 0.9999"
     assert f"breaks the schema of navirl reward at profiles/0/level: {level} is {found}\n" in result.stderr
 
 
-def test_the_command_refuses_what_has_no_room_in_its_column_and_draws_it_wide(plot):
+def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(plot):
     result = plot(common())
     assert result.exit_code == 1
-    assert result.stderr.endswith(": use --wide, or fewer --profile in navirl fit\n")
+    assert result.stderr.endswith("; set --wide, or fit again with fewer parameters in --profile\n")
     assert plot(common(), "--wide").exit_code == 0
     assert plot(common()[:2]).exit_code == 0

@@ -1,4 +1,4 @@
-"""What the figure of path properties draws, and that no two of its labels touch; colours."""
+"""The figure of path properties, and the colours of groups."""
 
 from itertools import pairwise
 
@@ -69,24 +69,20 @@ def test_panels_name_metric_and_unit_and_rows_group_and_count():
     assert bottom > top  # the first row stands at the top
 
 
-def test_every_row_of_metrics_is_a_bar_named_by_group_and_type_of_path():
-    kinds = (DRIVEN, ON_GRID, LEARNT, f"{LEARNT}, other", AVOIDANCE)
+def test_bars_are_named_by_group_and_type_of_path_and_baselines_have_none():
+    kinds = (DRIVEN, ON_GRID, LEARNT, AVOIDANCE)
     rows = [
         GroupMetrics("joystick", kind, count, values((1, 2, 3)), values((4, 5, 6))) for count, kind in enumerate(kinds)
     ]
     bars = bars_of(rows)
-    assert [one.label for one in bars] == [
-        "joystick",
-        "joystick, on grid",
-        "joystick, learnt",
-        "joystick, learnt, other",
-        "joystick, avoidance",
-    ]
-    assert [one.key for one in bars] == ["joystick", "joystick", LEARNT, LEARNT, "joystick"]
-    assert [(one.mean, one.std, one.count) for one in bars] == [(row.mean, row.std, row.count) for row in rows]
+    assert [one.label for one in bars] == ["joystick", "joystick, on grid", "joystick, learnt"]
+    assert [one.key for one in bars] == ["joystick", "joystick", LEARNT]
+    assert [(one.mean, one.std, one.count) for one in bars] == [(row.mean, row.std, row.count) for row in rows[:3]]
+    assert bars_of(rows, learnt_from={"joystick"}) == bars
+    assert bars_of(rows, learnt_from={"force"}) == bars[:1]
 
 
-def test_a_note_says_what_bars_and_whiskers_are():
+def test_a_note_explains_bars_and_whiskers():
     figure, _ = properties([bar()], COLUMN_IN)
     assert figure.get_supxlabel() == "bars: mean, whiskers: standard deviation"
 
@@ -115,10 +111,10 @@ def test_an_axis_has_three_ticks_at_least(mean, width_in):
 def test_numbers_too_long_for_three_ticks_have_fewer():
     figure, drawn = properties([bar(mean=(6543210.0, 0.00123, 2.0), std=(1.0, 0.0001, 0.5))], COLUMN_IN)
     assert [len(axes.get_xticks()) for axes in drawn.axes] == [2, 2, 3]
-    assert_nothing_touches(figure, drawn)
+    assert_labels_apart(figure, drawn)
 
 
-def test_names_of_bars_break_between_words_and_leave_the_panels_their_room():
+def test_labels_of_bars_break_between_words_and_leave_room_for_the_panels():
     bars = [bar(), bar("force, cycle 2, on grid"), bar("learnt from force, cycle 2", count=600), bar("joystick")]
     figure, drawn = properties(bars, COLUMN_IN)
     figure.draw_without_rendering()
@@ -133,16 +129,16 @@ def test_names_of_bars_break_between_words_and_leave_the_panels_their_room():
     assert panels > 0.7 * figure.bbox.width
 
 
-def test_a_mean_that_does_not_exist_is_said_to_be_missing():
+def test_a_mean_that_does_not_exist_is_marked():
     nan = float("nan")
     figure, drawn = properties([bar(), bar("alone", "autonomous", (6.0, nan, 0.1), (nan, nan, nan), 1)])
     figure.draw_without_rendering()
-    assert [[text.get_text() for text in axes.texts] for axes in drawn.axes] == [[], ["none"], []]
+    assert [[text.get_text() for text in axes.texts] for axes in drawn.axes] == [[], ["n/a"], []]
     assert drawn.axes[1].texts[0].xy == (0.0, 1)
     assert drawn.axes[1].get_xlim()[0] == 0.0
 
 
-def test_negative_distances_stay_on_the_paper():
+def test_negative_distances_are_within_the_axis():
     _, drawn = properties([bar(mean=(6.0, -0.2, 1.0), std=(0.1, 0.1, 0.1))])
     low, high = drawn.axes[1].get_xlim()
     assert low < -0.3
@@ -150,12 +146,12 @@ def test_negative_distances_stay_on_the_paper():
 
 
 @pytest.mark.parametrize(("width_in", "rows"), layouts((COLUMN_IN, 20), (PAGE_IN, 1), (COLUMN_IN, 1), (PAGE_IN, 20)))
-def test_no_two_labels_touch(width_in, rows):
+def test_no_labels_overlap(width_in, rows):
     bars = [bar(f"force, cycle {n}: driven, on the grid of the map", count=10 * n) for n in range(rows)]
-    assert_nothing_touches(*properties(bars, width_in))
+    assert_labels_apart(*properties(bars, width_in))
 
 
-def assert_nothing_touches(figure, drawn):
+def assert_labels_apart(figure, drawn):
     figure.draw_without_rendering()
     boxes = [label.get_window_extent() for label in drawn.axes[0].get_yticklabels()]
     assert all(upper.y0 > lower.y1 for upper, lower in pairwise(boxes))
@@ -171,7 +167,7 @@ def assert_nothing_touches(figure, drawn):
 
 
 def test_no_bar_is_refused():
-    with pytest.raises(DemonstrationError, match=r"^no paths to compare$"):
+    with pytest.raises(DemonstrationError, match=r"^no path properties to draw$"):
         draw_properties(new_figure(panels=3)[1], [])
 
 
@@ -185,7 +181,7 @@ def test_no_bar_is_refused():
         ("joystick, cycle 2", "#D55E00"),
         ("autonomous", "#009E73"),
         ("driven, on grid", "#7A7A7A"),
-        ("of no kind", "#8C8C8C"),
+        ("unknown", "#8C8C8C"),
     ],
 )
 def test_a_group_has_one_colour(key, colour):

@@ -1,8 +1,8 @@
-"""What the figure of ranks draws: their distribution, the uniform one, and the band in which all of it should lie."""
+"""The figure of ranks: their distribution, the uniform one, and the band around it."""
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches, legend_texts
+from figure_checks import assert_no_overlap, legend_texts
 from figure_factory import one_axes
 from scipy.stats import kstest
 
@@ -25,7 +25,7 @@ def test_steps_rise_by_one_share_at_every_rank():
     assert drawn.axes.get_ylabel() == "share of demonstrations"
 
 
-def test_the_band_holds_nineteen_of_twenty_sets_of_uniform_ranks_as_a_whole():
+def test_the_band_contains_nineteen_of_twenty_sets_of_uniform_ranks_completely():
     rng = np.random.default_rng(0)
     reach = draw_ranks(one_axes(), rng.uniform(size=25), 0.5).reach
     within = [kstest(rng.uniform(size=25), "uniform").statistic <= reach for _ in range(500)]
@@ -35,7 +35,7 @@ def test_the_band_holds_nineteen_of_twenty_sets_of_uniform_ranks_as_a_whole():
 
 
 @pytest.mark.parametrize("count", [1, 4, 500])
-def test_the_band_lies_a_reach_around_the_diagonal_and_within_0_and_1(count):
+def test_the_band_is_a_reach_around_the_diagonal_and_within_0_and_1(count):
     drawn = draw_ranks(one_axes(), np.linspace(0, 1, count), 0.5)
     (path,) = drawn.band.get_paths()
     for x, y in path.vertices:
@@ -44,23 +44,23 @@ def test_the_band_lies_a_reach_around_the_diagonal_and_within_0_and_1(count):
     assert legend_texts(drawn.axes) == ["demonstrations", "uniform", "95 % band of uniform ranks"]
 
 
-def test_number_and_p_value_are_said():
+def test_the_title_gives_number_and_p_value():
     drawn = draw_ranks(one_axes(), RANKS, 0.5678)
-    assert drawn.axes.get_title() == "n = 4, p = 0.57 (Kolmogorov and Smirnov)"
+    assert drawn.axes.get_title() == "n = 4, p = 0.57 (Kolmogorov-Smirnov)"
     crowded = draw_ranks(one_axes(), np.linspace(0.0, 0.1, 50), 0.000999)
-    assert crowded.axes.get_title() == "n = 50, p < 0.001 (Kolmogorov and Smirnov)"
+    assert crowded.axes.get_title() == "n = 50, p < 0.001 (Kolmogorov-Smirnov)"
 
 
-def test_no_two_texts_touch():
+def test_no_texts_overlap():
     axes = one_axes(COLUMN_IN)
     draw_ranks(axes, RANKS, 0.5)
     trim_height(axes.figure)
-    assert_nothing_touches(axes.figure)
+    assert_no_overlap(axes.figure)
 
 
-def test_no_ranks_and_numbers_that_are_none_are_refused():
+def test_no_ranks_and_numbers_that_are_no_shares_are_refused():
     with pytest.raises(DemonstrationError, match=r"^no ranks to draw$"):
         draw_ranks(one_axes(), np.array([]), 0.5)
     for wrong in (-0.1, 1.1, np.nan):
-        with pytest.raises(DemonstrationError, match=r"ranks need to be shares from 0 to 1, found "):
+        with pytest.raises(DemonstrationError, match=r"ranks: expected shares from 0 to 1, found "):
             draw_ranks(one_axes(), np.array([0.5, wrong]), 0.5)

@@ -1,4 +1,4 @@
-"""What the figures of a study share: rows of panels, one legend below all, and colours that stay apart."""
+"""Rows of panels with one legend, and distinct colours."""
 
 from itertools import combinations, pairwise
 
@@ -11,7 +11,7 @@ from navirl_cli.figures.sheet import common_legend, new_figure, outer_labels, tr
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, colour_of, level_colours
 
 
-def test_panels_stand_row_by_row():
+def test_panels_are_ordered_row_by_row():
     _, axes = new_figure(PAGE_IN, panels=5, columns=2)
     places = [(panel.get_subplotspec().rowspan.start, panel.get_subplotspec().colspan.start) for panel in axes]
     assert places == [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)]
@@ -61,7 +61,7 @@ def test_a_free_place_takes_the_legend():
 
 
 @pytest.mark.parametrize("panels", [1, 2])
-def test_rows_of_maps_leave_no_height_empty_and_keep_their_width(panels):
+def test_no_height_of_rows_of_maps_is_empty_and_their_width_stays(panels):
     figure, axes = new_figure(PAGE_IN, panels=panels, columns=1)
     for panel in axes:
         panel.imshow(np.zeros((10, 20)))
@@ -92,7 +92,7 @@ def test_special_sets_have_the_colour_of_their_condition(key, colour):
     assert colour_of(key) == colour
 
 
-def test_the_study_s_groups_are_apart_for_every_colour_vision():
+def test_the_study_s_groups_are_distinct_for_every_colour_vision():
     groups = ["force, cycle 1", "force, cycle 2", "joystick", "obstacle avoidance"]
     groups += ["replay of the learnt policy", "replay of the joystick"]
     for one, other in combinations(groups, 2):
@@ -104,7 +104,7 @@ def test_the_study_s_groups_are_apart_for_every_colour_vision():
 
 
 @pytest.mark.parametrize("levels", range(2, 11))
-def test_levels_are_the_darker_the_farther_from_the_middle_on_both_sides(levels):
+def test_levels_darken_away_from_the_middle_on_both_sides(levels):
     lightness = [lab(colour)[0] for colour in level_colours(levels)]
     assert (np.diff(lightness[: (levels + 1) // 2]) > 0).all()
     assert (np.diff(lightness[levels // 2 :]) < 0).all()

@@ -1,4 +1,4 @@
-"""Figures as files: formats, refusals, the same bytes, nothing left behind; and no display."""
+"""Figures as files: formats, refusals, the same bytes, no display."""
 
 import ast
 import os
@@ -64,7 +64,9 @@ def test_dollars_in_a_title_are_dollars(tmp_path):
     [("map.jpg", r'the extension "\.jpg"'), ("map", "no extension"), ("m.svg.gz", r'extension "\.gz"')],
 )
 def test_an_unknown_extension_is_refused(tmp_path, name, found):
-    with pytest.raises(ArtefactError, match=rf"{name}: a figure is saved as \.png, \.pdf or \.svg, found .*{found}"):
+    with pytest.raises(
+        ArtefactError, match=rf"{name}: expected a name that ends in \.png, \.pdf or \.svg, found .*{found}"
+    ):
         save_figure(figure(), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
@@ -109,12 +111,12 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
 
 def test_a_target_can_be_checked_before_the_work(tmp_path):
     assert check_target(tmp_path / "a.PDF") == "pdf"
-    with pytest.raises(ArtefactError, match="a figure is saved as"):
+    with pytest.raises(ArtefactError, match="expected a name that ends in"):
         check_target(tmp_path / "a.txt")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_empty_height_is_taken_away_and_the_width_kept(tmp_path):
+def test_empty_height_is_removed_and_the_width_stays(tmp_path):
     made, (axes,) = new_figure(COLUMN_IN)
     axes.imshow(np.zeros((10, 50)))
     before = made.get_size_inches()[1]
@@ -147,7 +149,7 @@ def test_no_setting_of_the_process_changes(tmp_path):
     assert dict(mpl.rcParams) == before
 
 
-#: What figures take from the rooms that solve: types, names, and what an axis needs. Nothing that computes a policy.
+#: Names that figures import from the rooms that solve: types and constants, nothing that computes a policy.
 TAKEN = {
     "navirl_cli.irl.profile": {"Profile", "fall_at"},
     "navirl_cli.irl.scene": {"Scene"},
@@ -163,7 +165,7 @@ TAKEN = {
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_figures_draw_and_solve_nothing(module):
+def test_figures_only_draw_what_other_rooms_solve(module):
     tree = ast.parse((Path(navirl_cli.figures.__file__).parent / f"{module}.py").read_text())
     rooms = ("navirl_cli.irl", "navirl_cli.evaluation", "navirl_cli.study")
     for node in ast.walk(tree):

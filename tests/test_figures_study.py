@@ -1,4 +1,4 @@
-"""What the figures of a study draw: completion times, paths by condition, policies in several scenes, answers."""
+"""Figures of a study: completion times, paths by condition, policies in several scenes."""
 
 from dataclasses import replace
 from functools import cache
@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from figure_checks import assert_nothing_touches, labelled, layouts
+from figure_checks import assert_no_overlap, labelled, layouts
 from figure_factory import demonstration, room
 from matplotlib.colors import to_hex
 
@@ -40,7 +40,7 @@ def test_boxes_are_quartiles_and_whiskers_end_within_one_and_a_half_of_their_ran
         low, middle, high = np.percentile(values, [25, 50, 75])
         assert (box.get_path().vertices[:, 1].min(), box.get_path().vertices[:, 1].max()) == pytest.approx((low, high))
         assert set(median.get_ydata()) == {middle}
-    assert [whisker.get_ydata()[1] for whisker in drawn.whiskers] == [35.5, 41.0, 25.0, 27.0]  # 50 s lies beyond
+    assert [whisker.get_ydata()[1] for whisker in drawn.whiskers] == [35.5, 41.0, 25.0, 27.0]  # 50 s is farther
     assert [to_hex(box.get_facecolor()) for box in drawn.boxes] == ["#0072b2", "#d55e00"]
 
 
@@ -57,7 +57,7 @@ def test_every_time_is_a_dot_above_its_modality_and_the_axis_starts_at_0():
 
 
 @pytest.mark.parametrize("values", [[30.0], [30.0] * 3, [30.0] * 50, np.linspace(28, 32, 50)])
-def test_dots_part_where_they_would_hide_each_other_and_stand_where_they_stood(values):
+def test_dots_that_would_overlap_are_moved_sideways_always_in_the_same_manner(values):
     figure, drawn = completion({"force": values, "joystick": [10.0, 50.0]})
     figure.draw_without_rendering()
     places = drawn.axes.transData.transform(drawn.dots[0].get_xydata()) / figure.dpi
@@ -66,7 +66,7 @@ def test_dots_part_where_they_would_hide_each_other_and_stand_where_they_stood(v
     assert min(apart, default=1.0) > (0.5 if len(values) == 50 else 1.0) * dot_in
     again = completion({"force": values, "joystick": [10.0, 50.0]})[1]
     np.testing.assert_array_equal(again.dots[0].get_xydata(), drawn.dots[0].get_xydata())
-    assert set(drawn.dots[1].get_xdata()) == {1.0}  # nothing is in their way
+    assert set(drawn.dots[1].get_xdata()) == {1.0}  # no dots overlap them
 
 
 @pytest.mark.parametrize(
@@ -80,20 +80,22 @@ def test_dots_part_where_they_would_hide_each_other_and_stand_where_they_stood(v
         (PAGE_IN, LONG_NAMES),
     ),
 )
-def test_no_two_labels_of_completion_times_touch(width_in, times_s):
+def test_no_labels_of_completion_times_overlap(width_in, times_s):
     figure, drawn = completion(times_s, width_in)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     assert len(drawn.boxes) == len(times_s)
     widths = [np.ptp(drawn.axes.transData.transform(box.get_path().vertices)[:, 0]) for box in drawn.boxes]
     assert max(widths) / figure.dpi < 0.8
 
 
-def test_no_time_and_times_that_are_none_are_refused():
+def test_no_times_and_impossible_times_are_refused():
     for nothing in ({}, {"force": []}):
-        with pytest.raises(DemonstrationError, match=r"^no completion time to draw$"):
+        with pytest.raises(DemonstrationError, match=r"^no completion times to draw$"):
             completion(nothing)
     for wrong in (0.0, -3.0, np.nan, np.inf):
-        with pytest.raises(DemonstrationError, match=r"completion times of joystick: need seconds above 0, found \["):
+        with pytest.raises(
+            DemonstrationError, match=r"completion times of joystick: expected seconds above 0, found \["
+        ):
             completion({"force": [3.0], "joystick": [wrong, 2.0]})
 
 
@@ -139,7 +141,7 @@ def test_one_legend_names_what_is_in_any_panel():
     assert [entries[group].get_color() for group in groups] == [COLOURS[group] for group in groups]
 
 
-def test_contact_is_explained_where_somebody_pushed_and_unknown_contact_is_none():
+def test_the_legend_explains_contact_and_unknown_contact_is_not_drawn():
     pushed = replace(FIRST[0], contacts=demonstration(contacts=[(2.0, 4.0)]).contacts)
     _, drawn = conditions([("cycle 1", [pushed]), ("cycle 2", [replace(SECOND[0], contacts=None)])])
     assert [len(panel.contacts) for panel in drawn.panels] == [1, 0]
@@ -157,11 +159,11 @@ def test_all_panels_show_what_the_widest_needs():
     ("count", "columns", "width_in"),
     layouts((2, 2, COLUMN_IN), (3, 2, PAGE_IN), (4, 2, PAGE_IN), (2, 1, COLUMN_IN)),
 )
-def test_panels_are_of_one_size_and_nothing_in_them_touches(count, columns, width_in):
+def test_panels_are_of_one_size_and_no_texts_overlap(count, columns, width_in):
     panels = [(f"{title} with the participants' hands", members) for title, members in PANELS[:count]]
     figure, drawn = conditions(panels, columns, width_in)
     trim_height(figure)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     boxes = [panel.axes.get_window_extent() for panel in drawn.panels]
     assert np.ptp([box.width for box in boxes]) < 1.0
     assert sum(box.width for box in boxes[:columns]) > (0.75 if width_in == COLUMN_IN else 0.85) * figure.bbox.width
@@ -239,7 +241,7 @@ def test_one_colour_bar_stands_above_each_column():
     figure.draw_without_rendering()
     for column, label in (
         (drawn.policies, "expected visits"),
-        (drawn.rewards, "state reward per step (without cost of way)"),
+        (drawn.rewards, "state reward per step (without path length)"),
     ):
         (bar,) = {one.colour_bar for one in column}
         assert bar.ax.get_xlabel() == label
@@ -271,14 +273,14 @@ def test_rows_of_different_places_keep_their_numbers():
 
 
 @pytest.mark.parametrize(("count", "width_in"), [(1, PAGE_IN), (2, COLUMN_IN)])
-def test_nothing_in_rows_of_policies_touches(count, width_in):
+def test_no_texts_in_rows_of_policies_overlap(count, width_in):
     entries = [
-        (f"{title} beside an obstacle that nobody ever saw in any of the demonstrations", one)
+        (f"{title} beside an obstacle that is in none of the demonstrations at all, only here", one)
         for title, one in scenes()[:count]
     ]
     figure, drawn = policies(entries, width_in)
     trim_height(figure)
-    assert_nothing_touches(figure)
+    assert_no_overlap(figure)
     boxes = [one.axes.get_window_extent() for one in (*drawn.policies, *drawn.rewards)]
     assert np.ptp([box.width for box in boxes]) < 1.0
     assert boxes[0].width > (0.38 if width_in == COLUMN_IN else 0.43) * figure.bbox.width
@@ -288,5 +290,5 @@ def test_scenes_that_cannot_be_drawn_are_refused():
     with pytest.raises(SceneError, match=r"^no scene to draw$"):
         draw_policy_and_reward([], [], 0.3)
     title, one = scenes()[0]
-    with pytest.raises(ValueError, match=r"one number for each of \d+ states is needed, found shape \(3,\)"):
+    with pytest.raises(ValueError, match=r"expected one value for each of \d+ states, found shape \(3,\)"):
         policies([(title, replace(one, reward_by_cell=np.zeros(3)))])

@@ -1,4 +1,4 @@
-"""``navirl plot`` as it is called: options of every figure, and refusals in one line."""
+"""``navirl plot``: help, options of every figure, and refusals in one line."""
 
 import json
 import subprocess
@@ -109,18 +109,18 @@ def test_every_map_can_be_cropped_and_shows_the_same(files, figure_of):
 def test_paths_over_a_map_are_those_of_its_scene_and_repeat_with_the_seed(files, figure_of):
     words = ("policy", files / "demos.json", "--reward", files / "reward.json")
     both = ("--overlay", "demos", "--overlay", "samples", "--samples", "7")
-    ways = []
+    paths = []
     for seed in (1, 1, 2):
         figure = figure_of(*words, *both, "--seed", seed)
         shown = entries(figure)
-        assert shown[:2] == ["force, cycle 1 (n = 1)", "drawn from the policy (n = 7)"]  # the other has another scene
+        assert shown[:2] == ["force, cycle 1 (n = 1)", "sampled from the policy (n = 7)"]  # the other has another scene
         drawn = [line for line in figure.axes[0].lines if line.get_color() == "#CC79A7"]
-        ways.append([line.get_xydata().tolist() for line in drawn])
-        assert len(ways[-1]) == 7
-    assert ways[0] == ways[1] != ways[2]
+        paths.append([line.get_xydata().tolist() for line in drawn])
+        assert len(paths[-1]) == 7
+    assert paths[0] == paths[1] != paths[2]
 
 
-def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
+def test_wrong_outputs_are_refused_before_any_work(navirl, files, tmp_path):
     for name in ("a.gif", "a", "a.svg.gz"):
         message = (
             f"Invalid value for '-o' / '--output': expected a name that ends in .png, .pdf or .svg, found '{name}'"
@@ -136,13 +136,13 @@ def test_what_cannot_be_drawn_is_said_before_any_work(navirl, files, tmp_path):
     assert json.loads((files / "reward.json").read_text())["format"] == "navirl/reward"
 
 
-def test_the_styles_and_formats_offered_are_those_that_there_are():
+def test_the_options_offer_all_styles_and_formats():
     assert list(STYLES) == list(LOOKS)
     assert list(FORMATS) == list(sheet.METADATA)
 
 
 @pytest.mark.parametrize(("kind", "label"), [("value", "soft value [nats]"), ("actions", "most likely move")])
-def test_values_and_moves_are_drawn_of_the_trial_that_was_asked_for(files, figure_of, kind, label):
+def test_values_and_moves_are_those_of_the_chosen_trial(files, figure_of, kind, label):
     words = (kind, files / "demos.json", "--reward", files / "reward.json", "--trial", "p01/2")
     (map_axes,) = figure_of(*words, "--overlay", "demos").axes
     assert "joystick (n = 1)" in entries(map_axes.figure)
@@ -150,17 +150,20 @@ def test_values_and_moves_are_drawn_of_the_trial_that_was_asked_for(files, figur
     assert label in (bar.get_ylabel() + bar.get_xlabel()).replace("\n", " ")
 
 
-def test_forces_are_drawn_of_a_trial_that_has_some_and_others_are_refused(navirl, files, figure_of):
+def test_forces_are_drawn_and_a_trial_without_forces_is_refused(navirl, files, figure_of):
     document = json.loads((files / "demos.json").read_text())
     count = len(document["demonstrations"][0]["t_s"])
     document["demonstrations"][0] |= {"force_x_n": [0.0] * count, "force_y_n": [9.0] * count}
     Path("forced.json").write_text(json.dumps(document))
     assert figure_of("forces", "forced.json").axes[0].get_title() == "p01/1: force, cycle 1"
     message = navirl("plot", "forces", "forced.json", "--trial", "p01/2", "-o", "b.png", code=1).stderr
-    assert "demonstration p01/2: no forces to draw, for its log holds no wrench; choose another with --trial" in message
+    assert (
+        "demonstration p01/2: no forces to draw, because its log holds no wrench; choose another with --trial"
+        in message
+    )
 
 
-def test_convergence_is_drawn_of_the_path_that_the_file_keeps(files, figure_of):
+def test_convergence_is_that_of_the_file(files, figure_of):
     kept = json.loads((files / "reward.json").read_text())["search"]
     assert len(kept["log_likelihood"]) == len(kept["theta"]) > 1
     figure = figure_of("convergence", files / "reward.json")
@@ -173,7 +176,7 @@ def test_convergence_is_drawn_of_the_path_that_the_file_keeps(files, figure_of):
     [
         (
             lambda content: content.pop("search"),
-            "holds no iterations, as files of older versions; fit anew with navirl",
+            "reward.json: expected iterations of a fit, found none; fit again with this version",
         ),
         (lambda content: content["search"]["theta"].pop(), "search/theta: expected"),
         (lambda content: content["search"]["theta"][0].pop(), "rows of 4 numbers, as search/log_likelihood"),
@@ -181,14 +184,14 @@ def test_convergence_is_drawn_of_the_path_that_the_file_keeps(files, figure_of):
         (lambda content: content["search"].update(log_likelihood=[]), "breaks the schema of navirl reward at search"),
     ],
 )
-def test_a_file_without_a_sound_path_is_refused(navirl, files, change, message):
+def test_a_file_without_valid_iterations_is_refused(navirl, files, change, message):
     content = json.loads((files / "reward.json").read_text())
     change(content)
     Path("reward.json").write_text(json.dumps(content))
     assert message in navirl("plot", "convergence", "reward.json", "-o", "a.png", code=1).stderr
 
 
-def test_ranks_are_those_of_the_groups_that_were_asked_for(navirl, files, figure_of):
+def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
     words = ("ranks", files / "demos.json", "--reward", files / "reward.json", "--samples", "50")
     assert figure_of(*words).axes[0].get_title().startswith("n = 2, p ")
     assert figure_of(*words, "--group", "joystick").axes[0].get_title().startswith("n = 1, p ")
@@ -196,13 +199,13 @@ def test_ranks_are_those_of_the_groups_that_were_asked_for(navirl, files, figure
     assert "no group is called 'joystik'; there are 'force, cycle 1', 'joystick'" in message
 
 
-def test_two_rewards_or_two_groups_stand_beside_each_other(files, figure_of):
+def test_two_rewards_or_two_groups_are_side_by_side(files, figure_of):
     words, one = ("compare", files / "demos.json"), ("--reward", files / "reward.json")
     Path("other.json").write_text((files / "reward.json").read_text())
     figure = figure_of(*words, *one, "--reward", "other.json", "--trial", "p01/2", "--crop")
     assert [panel.get_title(loc="left") for panel in figure.axes[:4]] == ["reward", "", "other", ""]
     assert len({(*panel.get_xlim(), *panel.get_ylim()) for panel in figure.axes[:4]}) == 1
-    figure = figure_of(*words, *one, *one)  # names that tell nothing are told with their folders
+    figure = figure_of(*words, *one, *one)  # equal names are shown with their folders
     assert figure.axes[0].get_title(loc="left").replace("\n", "") == str(files / "reward.json")
     figure = figure_of(*words, "--group", "joystick", "--group", "force, cycle 1")
     titles = [" ".join(panel.get_title().split()) for panel in figure.axes]
@@ -215,5 +218,5 @@ def test_what_cannot_be_compared_is_refused(navirl, files):
     for wrong in ((), one, ("--group", "joystick"), (*one, *one, "--group", "joystick")):
         assert needs in navirl(*words, *wrong, code=2).stderr
     both = ("--group", "joystick", "--group", "force, cycle 1", "--trial", "p01/1")
-    assert "--trial chooses the scene of --reward" in navirl(*words, *both, code=2).stderr
+    assert "--trial selects the scene of --reward" in navirl(*words, *both, code=2).stderr
     assert "no group is called 'x'" in navirl(*words, "--group", "x", "--group", "y", code=1).stderr

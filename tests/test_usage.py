@@ -12,7 +12,7 @@ from navirl_cli.commands.usage import as_options
 
 PACKAGE = Path(navirl_cli.__file__).parent
 #: Rooms whose messages still name options.
-PENDING = {"artefacts", "evaluation", "figures", "reports"}
+PENDING = {"artefacts", "evaluation", "reports"}
 #: Commands of other tools, which have options of their own.
 OTHER_TOOLS = re.compile(r"rosbags-convert|zstd ")
 

@@ -19,16 +19,16 @@ from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, ArtefactError
-from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
+from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import by_group, group_of
+from navirl_cli.evaluation.groups import group_of
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import ranks_of, uniformity
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.overlay import Overlay, alike
+from navirl_cli.figures.overlay import alike, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
@@ -204,10 +204,7 @@ def properties(
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
-    shown = _taught(reward, demonstrations)
-    bars = bars_of(
-        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in shown)
-    )
+    bars = bars_of(result.groups, _taught(reward, demonstrations))
     panels = len(PAPER_METRICS)
     height_in = height_for(bars, _width_in(page))
     return _drawn(lambda axes: draw_properties(axes, bars), None, page, panels=panels, height_in=height_in)
@@ -363,12 +360,10 @@ def _cells(
 ) -> CellOptions:
     """What all figures of a scene share; a cropped one shows the same window in all of them."""
     wanted = {one_of(("demos", "samples"), one, "overlay") for one in texts(overlay)}
-    overlays = []
-    if "demos" in wanted:
-        groups = by_group(alike(demos or [view.demonstration], view.demonstration))
-        overlays += [Overlay(group, group, [one.xy_m for one in own]) for group, own in groups.items()]
-    if "samples" in wanted:
-        overlays.append(Overlay("drawn from the policy", LEARNT, view.sample(samples, seed=seed)))
+    overlays = overlays_of(
+        alike(demos or [view.demonstration], view.demonstration) if "demos" in wanted else (),
+        view.sample(samples, seed=seed) if "samples" in wanted else (),
+    )
     lines = [line for one in overlays for line in one.lines_m]
     window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
     return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}

@@ -1,1 +1,1 @@
-"""Figures as a paper prints them: functions that draw on axes handed in; the only users of matplotlib."""
+"""Figures for papers and screens: functions that draw solved values on given axes. Only this room uses matplotlib."""

@@ -20,16 +20,16 @@ from navirl_cli.figures.marks import Marks
 from navirl_cli.figures.style import house_style, look, panel_width_in
 from navirl_cli.irl.scene import Scene
 
-#: From arrow to arrow at least this, and width of a shaft, inches; length of a sure move's arrow in shares of the way
-#: between two arrows.
+#: Least distance between arrows, and width of a shaft, inches; length of the arrow of a certain move as a share of the
+#: distance between arrows.
 _PITCH_IN, _SHAFT_IN, _LENGTH = 0.085, 0.009, 0.95
-#: What labels and the colour bar take of a panel's width, inches.
+#: Width of the labels and the colour bar beside a map, inches.
 _BESIDE_IN = 0.85
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnActions:
-    """What :func:`draw_actions` put on the axes."""
+    """The artists of :func:`draw_actions`."""
 
     axes: Axes
     window_m: Window
@@ -47,8 +47,8 @@ class DrawnActions:
 def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: Unpack[CellOptions]) -> DrawnActions:
     """Draw the most likely move of a policy in every cell that is shown.
 
-    The surer the move the longer and stronger its arrow. Where the cells are too small for that, every second has an
-    arrow, or every third, and so on, both along x and along y.
+    The more probable the move, the longer and darker its arrow. Where cells are too small, only every second cell has
+    an arrow, or every third, and so on, along x and along y.
 
     Args:
         axes: Where to draw.
@@ -60,7 +60,7 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
         The artists.
 
     Raises:
-        ValueError: There is not one row for each state.
+        ValueError: The number of rows is not the number of states.
     """
     if probability.shape != (scene.lattice.size, len(MOVES)):
         expected = f"({scene.lattice.size}, {len(MOVES)})"
@@ -85,12 +85,12 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
 
 
 def _stride(axes: Axes, scene: Scene, window: Window) -> int:
-    """From one cell with an arrow to the next, cells."""
+    """Distance between cells with an arrow, cells."""
     cell_in = scene.lattice.grid.resolution_m / (window[1] - window[0]) * (panel_width_in(axes) - _BESIDE_IN)
     return max(1, ceil(_PITCH_IN / cell_in))
 
 
 def _colours() -> LinearSegmentedColormap:
-    """Colours that can all be told from the paper."""
+    """Colours that all differ from the background."""
     strong = colormaps[look().intensity](np.linspace(0.25, 1.0, 256))
     return LinearSegmentedColormap.from_list("sure", strong)

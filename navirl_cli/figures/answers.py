@@ -23,26 +23,26 @@ from navirl_cli.figures.sheet import common_legend
 from navirl_cli.figures.style import INK, house_style, level_colours, panel_width_in
 from navirl_cli.study.questionnaire import Shares
 
-#: What the ends of the scale mean.
+#: Ends of the scale.
 DISAGREE, AGREE = "strongly disagree", "strongly agree"
-#: Shares of a figure's width that questions and modalities may take, and the mean width of a letter, inches.
+#: Largest shares of a figure's width for questions and for modalities; mean width of a letter, inches.
 _ASKED, _NAMED, _LETTER_IN = 0.32, 0.2, 0.055
-#: Heights of a line of text, of a bar, between bars, and between questions, inches.
+#: Height of a line of text and of a bar; distance between bars and between questions, inches.
 _LINE_IN, _BAR_IN, _APART_IN, _BETWEEN_IN = 0.125, 0.13, 0.04, 0.12
-#: Height of what stands below the bars, and of a row of the legend; width of a legend's entry without its text, inches.
+#: Height of the axis below the bars and of a row of the legend; width of a legend's entry without its text, inches.
 _BELOW_IN, _ROW_IN, _ENTRY_IN = 0.45, 0.15, 0.33
-#: Between question, modality and bar, points.
+#: Distance between question, modality and bar, points.
 _GAP_PT = 6.0
-#: Ends of the axis are multiples of this share, %; its numbers have this room at least, inches.
+#: The axis ends at multiples of this share, %; least distance between its numbers, inches.
 _ROUND, _TICK_IN = 25, 0.3
 
 
 @dataclass(frozen=True)
 class DrawnAnswers:
-    """What :func:`draw_answers` put on the axes."""
+    """The artists of :func:`draw_answers`."""
 
     axes: Axes
-    #: By level, a bar for each of those handed in.
+    #: By level, a bar for each given one.
     levels: list[BarContainer]
     #: One for each question.
     questions: list[Annotation]
@@ -52,7 +52,7 @@ class DrawnAnswers:
 
 
 def height_for(bars: Sequence[Shares], width_in: float) -> float:
-    """Height of a figure of these bars in which no two labels touch, inches.
+    """Height of a figure of these bars in which no labels overlap, inches.
 
     Args:
         bars: The bars.
@@ -67,18 +67,18 @@ def height_for(bars: Sequence[Shares], width_in: float) -> float:
 def draw_answers(axes: Axes, bars: Sequence[Shares]) -> DrawnAnswers:
     """Draw the shares of answers from "strongly disagree" on the left to "strongly agree" on the right.
 
-    The answers in the middle of an odd number of levels lie half on either side of 0; of an even number, half of the
-    levels lie on either side. Bars of one question stand together; a legend below names the levels.
+    With an odd number of levels, half of the neutral answers are on either side of 0. With an even number, half of the
+    levels are on either side. Bars of one question are together. A legend below names the levels.
 
     Args:
-        axes: Where to draw, alone in its figure, :func:`height_for` inches high with its labels.
-        bars: From top to bottom, those of a question one after the other.
+        axes: Where to draw: the only axes of a figure that is :func:`height_for` inches high.
+        bars: From top to bottom, grouped by question.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: There is no bar, one has no answer, or their scales differ.
+        DemonstrationError: No bars, a bar without answers, or bars with different scales.
     """
     _check(bars)
     width_in = panel_width_in(axes)
@@ -110,7 +110,7 @@ def draw_answers(axes: Axes, bars: Sequence[Shares]) -> DrawnAnswers:
 
 
 def _check(bars: Sequence[Shares]) -> None:
-    """Refuse what has no shares, or none that can be compared."""
+    """Refuse bars without answers, and bars with different scales."""
     if not bars:
         raise DemonstrationError("no answers to draw")
     for bar in bars:
@@ -128,12 +128,12 @@ def _by_question(bars: Iterable[Shares]) -> list[tuple[str, list[Shares]]]:
 
 
 def _wrapped(text: str, share: float, width_in: float) -> str:
-    """A text in lines that take a share of the figure's width."""
+    """A text in lines that are at most a share of the figure's width long."""
     return fill(text, int(share * width_in / _LETTER_IN))
 
 
 def _pitches(bars: Iterable[Shares], width_in: float) -> FloatArray:
-    """Heights of bars with the space around them, or of the names of their modalities, inches."""
+    """Heights of bars, or of their modalities' names if those are higher, with the space around them, inches."""
     lines = [_wrapped(bar.modality, _NAMED, width_in).count("\n") + 1 for bar in bars]
     return np.array([max(_BAR_IN, count * _LINE_IN) + _APART_IN for count in lines])
 
@@ -148,7 +148,7 @@ def _heights(bars: Iterable[Shares], width_in: float) -> list[float]:
 
 
 def _places(bars: Sequence[Shares], width_in: float) -> tuple[FloatArray, FloatArray, float]:
-    """Middles of bars and of questions, and the height of all, from the top, inches."""
+    """Middles of bars and of questions from the top, and the total height, inches."""
     heights = np.array(_heights(bars, width_in))
     middles = np.cumsum(heights) - heights / 2
     at = []
@@ -159,13 +159,13 @@ def _places(bars: Sequence[Shares], width_in: float) -> tuple[FloatArray, FloatA
 
 
 def _beside(axes: Axes, **look: Any) -> dict[str, Any]:
-    """How a text stands beside the axes: at a place in shares of their width and in y, moved by points."""
+    """Placement of a text beside the axes: x as a share of their width, y in data, shifted by points."""
     place = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points", "annotation_clip": False}
     return {**place, "va": "center", **look}
 
 
 def _name_modalities(axes: Axes, at: FloatArray, bars: Sequence[Shares]) -> float:
-    """Name the modality of every bar at its left; the width that this takes, points."""
+    """Write the modality left of every bar; the width of these texts, points."""
     names = [_wrapped(bar.modality, _NAMED, panel_width_in(axes)) for bar in bars]
     axes.set_yticks(at, names, linespacing=1.1)
     axes.tick_params(axis="y", length=0, pad=_GAP_PT / 2)
@@ -173,7 +173,7 @@ def _name_modalities(axes: Axes, at: FloatArray, bars: Sequence[Shares]) -> floa
 
 
 def _name_questions(axes: Axes, middles: FloatArray, bars: Sequence[Shares], beside_pt: float) -> list[Annotation]:
-    """Write every question left of its bars' modalities."""
+    """Write every question left of the modalities."""
     texts = [_wrapped(question, _ASKED, panel_width_in(axes)) for question, _ in _by_question(bars)]
     shift = -(_width_pt(texts) + beside_pt + _GAP_PT * (1.5 if beside_pt else 0.5))
     look = _beside(axes, fontsize=rcParams["ytick.labelsize"], ha="left", linespacing=1.1)
@@ -188,7 +188,7 @@ def _width_pt(texts: Iterable[str]) -> float:
 
 
 def _scale(axes: Axes, low: float, high: float, width_in: float) -> None:
-    """An axis in percent, to the left as to the right of 0 from 0 up."""
+    """An axis in percent that counts up from 0 to both sides."""
     low = min(-_ROUND, np.floor(low / _ROUND + 1e-9) * _ROUND)
     high = max(_ROUND, np.ceil(high / _ROUND - 1e-9) * _ROUND)
     axes.set_xlim(low, high)

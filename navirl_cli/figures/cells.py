@@ -1,4 +1,4 @@
-"""Numbers by cell over the map: the propagated policy and the state reward (Fig. 8)."""
+"""Values by cell over the map: the propagated policy and the state reward (Fig. 8)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,47 +23,50 @@ from navirl_cli.figures.overlay import Overlay, draw_overlays, overlay_handles
 from navirl_cli.figures.style import house_style, look, panel_width_in
 from navirl_cli.irl.scene import Scene
 
-#: The higher the lighter, and apart for every common kind of colour vision.
+#: Lighter is higher; distinct for every common type of colour vision.
 REWARD_MAP = colormaps["cividis"].with_extremes(bad=(0, 0, 0, 0))
-#: Cells with fewer expected visits than this stay as the paper: one path in a thousand passes there.
+#: Cells with fewer expected visits have the background's colour: at most one path in a thousand passes there.
 LEAST_VISITS = 1e-3
-#: Cells with this many are likely: a cropped map ends beyond them.
+#: Cells with at least so many expected visits are likely: a cropped map includes them.
 LIKELY_VISITS = 3e-2
-#: Colours of the reward span its values this near to the nominal path and to people, m: about personal distance (Hall).
+#: Colours of the reward span its values within this distance of the nominal path and of people, m: about the outer
+#: border of Hall's personal zone.
 REACH_M = 1.2
-#: Thickness of a colour bar and its distance from the map, in shares of the map's longer side.
+#: Thickness of a colour bar and its distance from the map, as shares of the map's longer side.
 _BAR, _GAP = 0.03, 0.02
-#: A map flatter than this has its colour bar above it, because the label is longer than the map is high.
+#: A map with a smaller ratio of height to width has its colour bar above, because the label is longer than it is high.
 _FLAT = 0.5
-#: Width of what stands beside a map and its colour bar, and of a letter of the bar's label, inches.
+#: Width of labels beside a map and its colour bar, and of a letter of the bar's label, inches.
 _BESIDE_IN, _LETTER_IN = 1.05, 0.056
-#: Letters in a line of the bar's label at least.
+#: Least number of letters in a line of the bar's label.
 _SHORTEST = 21
-#: Pointed ends of a colour bar, by whether shown cells lie below and above its range.
+#: Labels of the colour bars.
+VISITS, REWARD = "expected visits", "state reward per step (without path length)"
+#: Pointed ends of a colour bar, by whether values of shown cells are below and above its range.
 EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 
 class CellOptions(TypedDict, total=False):
-    """What every figure of a scene takes besides its numbers."""
+    """Options of every figure of a scene."""
 
-    #: Draws the robot at its start to scale, m.
+    #: Radius of the robot, which is drawn at its start to scale, m.
     robot_radius_m: float | None
-    #: Borders of what is shown, m; None: around the paths, or the whole map where it is not much larger.
+    #: Limits of the view, m; None: the paths' surroundings, or all of a map that is not much larger.
     window_m: Window | None
     #: Paths over the map.
     overlays: Sequence[Overlay]
     #: Title of the panel.
     title: str
-    #: Whether to put a legend below: so it is unless said otherwise.
+    #: Whether to put a legend below; default True.
     legend: bool
 
 
 @dataclass(frozen=True)
 class DrawnCells:
-    """What a figure of numbers by cell put on the axes."""
+    """The artists of a figure of values by cell."""
 
     axes: Axes
-    #: What is shown; hand it to another figure of the same scene so that both show the same.
+    #: Limits of the view, for another figure of the same scene with the same view.
     window_m: Window
     #: Its array is (rows, columns), masked where the robot cannot be.
     image: AxesImage
@@ -78,7 +81,7 @@ class DrawnCells:
 
 @house_style()
 def draw_policy(axes: Axes, scene: Scene, visits: FloatArray, **options: Unpack[CellOptions]) -> DrawnCells:
-    """Draw where a policy leads: expected visits of every cell, on a logarithmic scale (Fig. 8 left).
+    """Draw the propagated policy: expected visits of every cell, on a logarithmic scale (Fig. 8, left).
 
     Args:
         axes: Where to draw.
@@ -90,25 +93,25 @@ def draw_policy(axes: Axes, scene: Scene, visits: FloatArray, **options: Unpack[
         The artists.
 
     Raises:
-        ValueError: There is not one number for each state.
+        ValueError: The number of values is not the number of states.
     """
     check_states(scene, visits)
     window = options.get("window_m") or scene_window(scene, visits >= LEAST_VISITS)
     norm = LogNorm(LEAST_VISITS, max(1.0, float(visits.max())))
-    # Cells of no weight are as the paper, so that the likely paths stand out and print well.
+    # Unlikely cells have the background's colour. Likely paths stand out and print well.
     colours = colormaps[look().intensity].with_extremes(under=look().paper, bad=(0, 0, 0, 0))
     image = draw_image(axes, scene, visits, norm, colours)
-    bar = draw_bar(axes, image, window, "expected visits", extend="min")
+    bar = draw_bar(axes, image, window, VISITS, extend="min")
     return draw_scene(image, bar, scene, window, **options)
 
 
 @house_style()
 def draw_reward(axes: Axes, scene: Scene, reward_by_cell: FloatArray, **options: Unpack[CellOptions]) -> DrawnCells:
-    """Draw the part of the reward that belongs to the cell (Fig. 8 right).
+    """Draw the state reward: the part of the reward that depends on the cell (Fig. 8, right).
 
-    Colours span the values within REACH_M of the nominal path and of people, so that far corners of the map do not wash
-    them out; the colour bar has a pointed end where shown cells lie beyond. The cost of the way belongs to the move and
-    is not in it.
+    Colours span the values within REACH_M of the nominal path and of people: far corners of the map would leave few
+    colours for them. The colour bar has a pointed end where values of shown cells are outside of this span. The cost of
+    path length depends on the move and is not included.
 
     Args:
         axes: Where to draw.
@@ -120,7 +123,7 @@ def draw_reward(axes: Axes, scene: Scene, reward_by_cell: FloatArray, **options:
         The artists.
 
     Raises:
-        ValueError: There is not one number for each state.
+        ValueError: The number of values is not the number of states.
     """
     check_states(scene, reward_by_cell)
     window = options.get("window_m") or scene_window(scene, scene.nominal)
@@ -129,28 +132,31 @@ def draw_reward(axes: Axes, scene: Scene, reward_by_cell: FloatArray, **options:
     spanned, seen = reward_by_cell[near if near.any() else shown], reward_by_cell[shown]
     image = draw_image(axes, scene, reward_by_cell, Normalize(spanned.min(), spanned.max()), REWARD_MAP)
     ends = bool(seen.min() < spanned.min()), bool(seen.max() > spanned.max())
-    bar = draw_bar(axes, image, window, "state reward per step (without cost of way)", extend=EXTEND[ends])
+    bar = draw_bar(axes, image, window, REWARD, extend=EXTEND[ends])
     return draw_scene(image, bar, scene, window, **options)
 
 
 def check_states(scene: Scene, values: FloatArray) -> None:
-    """Refuse numbers that are not one for each state."""
+    """Refuse values that are not one for each state."""
     if values.shape != (scene.lattice.size,):
-        raise ValueError(f"one number for each of {scene.lattice.size} states is needed, found shape {values.shape}")
+        raise ValueError(f"expected one value for each of {scene.lattice.size} states, found shape {values.shape}")
 
 
 def scene_window(scene: Scene, shown: BoolArray) -> Window:
-    """What to show of a scene: its nominal path, the (n,) cells that matter, and the surroundings."""
+    """Limits of the view of a scene: its nominal path and the (n,) chosen cells, with a margin."""
     return window_around([scene.lattice.grid], scene.lattice.xy_m[shown | scene.nominal])
 
 
 def likely_window(scene: Scene, visits: FloatArray, lines_m: Sequence[FloatArray] = ()) -> Window:
-    """A scene cropped to where its policy leads.
+    """Limits of the view of a scene cropped to where its policy leads.
 
     Args:
         scene: The scene.
         visits: (n,) expected visits by state.
-        lines_m: (k, 2) paths, m, map frame, that are drawn over it.
+        lines_m: Paths drawn over it, each (k, 2), m, map frame.
+
+    Returns:
+        Limits, m, map frame.
     """
     ends = np.isin(np.arange(scene.lattice.size), (scene.start, scene.goal))
     likely = scene.lattice.xy_m[(visits >= LIKELY_VISITS) | ends]
@@ -158,7 +164,7 @@ def likely_window(scene: Scene, visits: FloatArray, lines_m: Sequence[FloatArray
 
 
 def shown_states(scene: Scene, window: Window) -> BoolArray:
-    """(n,) cells that a window shows; all where it shows none."""
+    """(n,) cells within a window; all cells if none is."""
     shown = inside(window, scene.lattice.xy_m)
     return shown if shown.any() else np.ones_like(shown)
 
@@ -172,14 +178,14 @@ def _within_reach(scene: Scene) -> BoolArray:
 
 
 def draw_image(axes: Axes, scene: Scene, values: FloatArray, norm: Normalize, colours: Colormap) -> AxesImage:
-    """An image of (n,) numbers by state."""
+    """Draw (n,) values by state as an image."""
     extent = scene.lattice.grid.extent_m
     style: dict[str, Any] = {"interpolation": "nearest", "rasterized": True, "zorder": 0}
     return axes.imshow(table_of(scene, values), cmap=colours, norm=norm, extent=extent, origin="lower", **style)
 
 
 def table_of(scene: Scene, values: FloatArray) -> np.ma.MaskedArray[Any, Any]:
-    """(n,) numbers by state as (rows, columns), masked where there is no state."""
+    """(rows, columns) table of (n,) values by state, masked where no state is."""
     columns, rows = scene.lattice.cells.T
     table = np.full(scene.lattice.grid.shape, np.nan)
     table[rows, columns] = values
@@ -187,7 +193,7 @@ def table_of(scene: Scene, values: FloatArray) -> np.ma.MaskedArray[Any, Any]:
 
 
 def draw_bar(axes: Axes, image: ScalarMappable, window: Window, label: str, extend: str) -> Colorbar:
-    """A colour bar exactly as high as the map, or as wide, above a flat one."""
+    """Draw a colour bar exactly as high as the map; above a flat map, exactly as wide."""
     shape = (window[3] - window[2]) / (window[1] - window[0])
     above = shape < _FLAT
     longer = max(1.0, shape)
@@ -211,7 +217,7 @@ def draw_bar(axes: Axes, image: ScalarMappable, window: Window, label: str, exte
 def draw_scene(
     image: AxesImage, bar: Colorbar, scene: Scene, window: Window, **options: Unpack[CellOptions]
 ) -> DrawnCells:
-    """Everything that stands on the cells, and the frame around them."""
+    """Draw everything over an image of cells, and the frame around it."""
     obstacles, nominal, marks, lines = draw_over(image.axes, scene, window, **options)
     return DrawnCells(image.axes, window, image, obstacles, nominal, marks.people, bar, marks, lines)
 
@@ -219,7 +225,7 @@ def draw_scene(
 def draw_over(
     axes: Axes, scene: Scene, window: Window, **options: Unpack[CellOptions]
 ) -> tuple[AxesImage, Line2D, Marks, list[Line2D]]:
-    """Obstacles, nominal path, people, start and goal, and paths of a scene, with the frame around them."""
+    """Draw obstacles, nominal path, people, start, goal and paths of a scene, and the frame around them."""
     ends, overlays = scene.lattice.xy_m[[scene.start, scene.goal]], options.get("overlays", ())
     obstacles = draw_obstacles(axes, scene.lattice.grid)
     lines = draw_overlays(axes, overlays)

@@ -1,4 +1,4 @@
-"""Driven paths by condition, a panel each (Figs. 3 and 5)."""
+"""Driven paths by condition, one panel for each (Figs. 3 and 5)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from navirl_cli.figures.paths import DrawnPaths, contact_handle, draw_paths, gro
 from navirl_cli.figures.sheet import common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
 
-#: Mean width of a letter of a title, with what of the panel stands beside its map, inches.
+#: Mean width of a letter of a title, including a share of the labels beside the map, inches.
 _LETTER_IN = 0.08
 
 
 @dataclass(frozen=True)
 class DrawnPanels:
-    """What :func:`draw_path_panels` put on the axes."""
+    """The artists of :func:`draw_path_panels`."""
 
     #: One for each condition.
     panels: list[DrawnPaths]
-    #: What every panel shows.
+    #: Limits of the view of every panel.
     window_m: Window
     legend: Legend
 
@@ -37,20 +37,20 @@ class DrawnPanels:
 def draw_path_panels(
     axes: Sequence[Axes], panels: Sequence[tuple[str, Sequence[Demonstration]]], *, crop: bool = False
 ) -> DrawnPanels:
-    """Draw the driven paths of several conditions, a panel each, all over the same part of the map.
+    """Draw the driven paths of several conditions, one panel for each, with the same view of the map.
 
-    Only the outermost panels have labels on their axes; one legend stands below all.
+    Only the outermost panels have labels on their axes. One legend is below all.
 
     Args:
         axes: One for each panel, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
-        panels: Titles, to which the number of paths is added, and demonstrations, all in the same map frame.
-        crop: Show no more of the map than what surrounds the paths.
+        panels: Titles and demonstrations, all in the same map frame. Titles get the number of paths.
+        crop: Show only the paths' surroundings.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: There is no panel, or one has no demonstration.
+        DemonstrationError: No panel, or a panel without demonstrations.
     """
     if not panels:
         raise DemonstrationError("no condition to draw")
@@ -68,13 +68,13 @@ def draw_path_panels(
 
 
 def _title(axes: Axes, title: str, count: int) -> str:
-    """A panel's title with the number of its paths, in lines that are no wider than the panel."""
+    """A panel's title with the number of paths, in lines at most as wide as the panel."""
     paths = f"(n\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}{count})"
     return fill(f"{title} {paths}", int(panel_width_in(axes) / _LETTER_IN))
 
 
 def _handles(drawn: Sequence[DrawnPaths], panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> list[Artist]:
-    """Legend entries of groups, of contact where there was any, and of what is on the maps."""
+    """Legend entries of groups, of contact if there was any, and of the maps' marks."""
     groups = dict.fromkeys(group for _, members in panels for group in by_group(members))
     contact = [contact_handle()] if any(one.contacts for one in drawn) else []
     return [*group_handles(groups), *contact, *merged_handles([one.marks for one in drawn])]

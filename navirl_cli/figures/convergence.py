@@ -1,4 +1,4 @@
-"""How a fit came to its maximum: log-likelihood and parameters over the iterations."""
+"""Convergence of a fit: log-likelihood and parameters over the iterations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,21 +14,21 @@ from navirl_cli.figures.profile import SYMBOLS
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style
 from navirl_cli.irl.terms.term import Parameter
 
-#: Height of a row of panels with its labels, inches; most iterations that are marked one by one.
+#: Height of a row of panels with its labels, inches; largest number of iterations with a marker each.
 ROW_IN, _MARKED = 1.3, 40
 
 
 @dataclass(frozen=True)
 class DrawnConvergence:
-    """What :func:`draw_convergence` put on the axes."""
+    """The artists of :func:`draw_convergence`."""
 
     axes: list[Axes]
-    #: Of the log-likelihood, then of every parameter.
+    #: The log-likelihood's, then one for every parameter.
     lines: list[Line2D]
 
 
 def columns_for(width_in: float) -> int:
-    """How many panels stand side by side in a figure of a width, inches."""
+    """Number of panels in a row of a figure of a width, inches."""
     return 3 if width_in >= PAGE_IN else 2
 
 
@@ -36,11 +36,11 @@ def columns_for(width_in: float) -> int:
 def draw_convergence(
     axes: Sequence[Axes], log_likelihood: FloatArray, theta: FloatArray, parameters: Sequence[Parameter]
 ) -> DrawnConvergence:
-    """Draw log-likelihood and parameters over the iterations of a search; titles name where it ended.
+    """Draw log-likelihood and parameters over the iterations of a search. Titles give the final values.
 
     Args:
-        axes: One for the log-likelihood and one for each parameter, in rows.
-        log_likelihood: (m,) nats, the start first.
+        axes: One for the log-likelihood and one for each parameter, row by row.
+        log_likelihood: (m,) nats, from the start on.
         theta: (m, k) parameters in their units.
         parameters: Their names and units.
 
@@ -53,7 +53,7 @@ def draw_convergence(
         lines.append(_panel(panel, values, symbol, parameter.unit.replace("^2", "²")))
     spec = axes[0].get_subplotspec()
     columns = 1 if spec is None else spec.get_gridspec().ncols
-    for panel in axes[-columns:]:  # nothing stands below them
+    for panel in axes[-columns:]:  # the lowest of each column
         panel.set_xlabel("iteration")
     return DrawnConvergence(list(axes), lines)
 

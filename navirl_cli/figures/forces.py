@@ -1,4 +1,4 @@
-"""The forces of one trial: over time, and as arrows along its path."""
+"""The forces of one trial, over time and as arrows along its path."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,30 +22,30 @@ from navirl_cli.figures.scale import free_corner, write_beside
 from navirl_cli.figures.sheet import common_legend
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
-#: Height over width of the panel over time, in a column and on a page, and the width from which it is a page, inches.
+#: Ratio of height to width of the panel over time in a column and on a page; least width of a page, inches.
 _ASPECT, _WIDE_ASPECT, _WIDE_IN = 0.5, 0.3, 5.0
-#: Width of what stands beside the panel, of a contact's numbers, and height of their two lines, inches.
+#: Width of the labels beside the panel and of a contact's numbers, and height of the numbers' two lines, inches.
 _BESIDE_IN, _NUMBERS_IN, _LINES_IN = 0.5, 0.44, 0.27
-#: The largest force is an arrow of this share of the map's width; arrows start at least this far apart, inches.
+#: Length of the largest force's arrow as a share of the map's width; least distance between arrows, inches.
 _LONGEST, _APART_IN = 0.12, 0.07
-#: Length of the arrow in the legend, where it can be, N, and the largest forces for which it can, N.
+#: Force of the reference arrow, N, and the range of a trial's largest force for which it is used, N.
 _REFERENCE_N, _FROM_N, _TO_N = 10.0, 8.0, 80.0
-#: The axis goes as high at least, so that a sensor's noise does not look like pushes, N.
+#: Least upper end of the axis, N: noise of a sensor must not look like pushes.
 _LEAST_N = 5.0
 _OPACITY = 0.18
 
 
 @dataclass(frozen=True)
 class DrawnForces:
-    """What :func:`draw_forces` put on the axes."""
+    """The artists of :func:`draw_forces`."""
 
     map: DrawnPaths
-    #: None where nobody pushed.
+    #: None without contact.
     arrows: Quiver | None
-    #: Length on the map of one newton, m, and the arrow that tells it, N.
+    #: Length of an arrow of one newton on the map, m, and the force of the reference arrow, N.
     metres_per_newton: float
     reference_n: float
-    #: The components along x and y of the map's frame, and the size, over time.
+    #: Components along x and y of the map frame, and magnitude, over time.
     over_time: Axes
     components: list[Line2D]
     size: Line2D
@@ -57,14 +57,14 @@ class DrawnForces:
 
 @house_style()
 def draw_forces(axes: Sequence[Axes], one: Demonstration, *, crop: bool = False) -> DrawnForces:
-    """Draw the horizontal forces of a trial: arrows along its path while there was contact, and all over time.
+    """Draw the horizontal forces of a trial: all over time, and those in contact as arrows along the path.
 
-    Arrows start where the robot's centre was. Contacts are shaded, with peak and impulse above.
+    Arrows start at the robot's centre. Contacts are shaded, with peak and impulse above.
 
     Args:
         axes: Two: of the map, and of the forces over time.
         one: The trial.
-        crop: Show no more of the map than what surrounds path and arrows.
+        crop: Show only the surroundings of path and arrows.
 
     Returns:
         The artists.
@@ -74,8 +74,8 @@ def draw_forces(axes: Sequence[Axes], one: Demonstration, *, crop: bool = False)
     """
     if one.force_n is None or one.contacts is None:
         raise DemonstrationError(
-            f"demonstration {one.id}: no forces to draw, for its log holds no wrench; choose another with --trial, or "
-            "extract a log of a robot with a force sensor"
+            f"demonstration {one.id}: no forces to draw, because its log holds no wrench; choose another with `trial`, "
+            "or extract a log of a robot with a force sensor"
         )
     peak = float(np.hypot(*one.force_n.T).max())
     whole = window_around([one.grid], np.concatenate([one.xy_m, [one.goal_m]]))
@@ -97,24 +97,24 @@ def draw_forces(axes: Sequence[Axes], one: Demonstration, *, crop: bool = False)
 
 
 def _share_height(axes: Sequence[Axes], window: Window) -> None:
-    """Make the map as wide as the panel over time."""
+    """Give the map the width of the panel over time."""
     spec = axes[0].get_subplotspec()
     if spec is not None and spec.get_gridspec().nrows == len(axes):
         spec.get_gridspec().set_height_ratios([(window[3] - window[2]) / (window[1] - window[0]), _aspect(axes[1])])
 
 
 def _aspect(axes: Axes) -> float:
-    """Height over width of the panel over time."""
+    """Ratio of height to width of the panel over time."""
     return _WIDE_ASPECT if panel_width_in(axes) >= _WIDE_IN else _ASPECT
 
 
 def _with_tips(one: Demonstration, arrows_m: FloatArray) -> FloatArray:
-    """(k, 2) m: a path, and the tips of arrows from all its points, as far as there was contact."""
+    """(k, 2) m: a path, and the tips of the arrows of its points in contact."""
     return np.concatenate([one.xy_m, (one.xy_m + arrows_m)[_in_contact(one)]])
 
 
 def _in_contact(one: Demonstration) -> IntArray:
-    """(k,) poses at which the person pushed."""
+    """(k,) numbers of the poses in contact."""
     within = np.zeros(len(one.t_s), dtype=bool)
     for contact in one.contacts or ():
         within |= (one.t_s >= contact.start_s) & (one.t_s <= contact.end_s)
@@ -123,12 +123,12 @@ def _in_contact(one: Demonstration) -> IntArray:
 
 
 def _arrows(axes: Axes, one: Demonstration, force_n: FloatArray, scale: float, window: Window) -> Quiver | None:
-    """Arrows at poses in contact, as near to each other as can be told apart."""
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(one.xy_m, axis=0).T))])
+    """Draw arrows at poses in contact, as dense as they can be distinguished."""
+    along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(one.xy_m, axis=0).T))])
     apart = _APART_IN * (window[1] - window[0]) / panel_width_in(axes)
     chosen: list[int] = []
     for pose in _in_contact(one):
-        if not chosen or way[pose] - way[chosen[-1]] >= apart:
+        if not chosen or along_m[pose] - along_m[chosen[-1]] >= apart:
             chosen.append(int(pose))
     if not chosen:
         return None
@@ -137,13 +137,13 @@ def _arrows(axes: Axes, one: Demonstration, force_n: FloatArray, scale: float, w
 
 
 def _arrow() -> dict[str, Any]:
-    """Look of an arrow that is as long on the map as its force says."""
+    """Look of an arrow whose length on the map is proportional to its force."""
     size = {"width": 0.008, "headwidth": 4.0, "headlength": 4.5, "headaxislength": 4.0}
     return {"angles": "xy", "scale_units": "xy", "scale": 1.0, "units": "inches", **size}
 
 
 def _reference(axes: Axes, window: Window, newtons: float, scale: float) -> None:
-    """An arrow of a round force in a free corner, with its number."""
+    """Draw an arrow of a round force in a free corner, with its number."""
     length = newtons * scale
     middle, top = free_corner(axes, window, length)
     axes.quiver(middle[0] - length / 2, middle[1], length, 0.0, color=look().ink, zorder=7, **_arrow())
@@ -151,30 +151,30 @@ def _reference(axes: Axes, window: Window, newtons: float, scale: float) -> None
 
 
 def _over_time(axes: Axes, one: Demonstration, force_n: FloatArray) -> list[Line2D]:
-    """Both components and the size, with axes and limits."""
+    """Draw both components and the magnitude, with axes and limits."""
     lines = []
     thin: dict[str, Any] = {"color": look().ink, "linewidth": 0.7}
     for values, name, kind in zip(force_n.T, "xy", ("--", (0, (1, 1))), strict=True):
         lines += axes.plot(one.t_s, values, linestyle=kind, label=f"force along {name} (map)", zorder=3, **thin)
     colour = colour_of(group_of(one))
-    lines += axes.plot(one.t_s, np.hypot(*force_n.T), color=colour, linewidth=1.2, label="size of force", zorder=3)
+    lines += axes.plot(one.t_s, np.hypot(*force_n.T), color=colour, linewidth=1.2, label="magnitude of force", zorder=3)
     axes.axhline(0.0, color=look().ink, linewidth=0.4, zorder=1)
     axes.set_xlim(one.t_s[0], one.t_s[-1])
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -_LEAST_N / 5), max(high, _LEAST_N))
-    axes.set_xlabel("time since the trial's start [s]")
+    axes.set_xlabel("time since start of trial [s]")
     axes.set_ylabel("force [N]")
     axes.set_box_aspect(_aspect(axes))
     return lines
 
 
 def _shade(axes: Axes, contact: Contact, colour: str) -> Rectangle:
-    """The time of a contact."""
+    """Shade the time of a contact."""
     return axes.axvspan(contact.start_s, contact.end_s, color=colour, alpha=_OPACITY, linewidth=0, zorder=0)
 
 
 def _name_contacts(axes: Axes, one: Demonstration) -> list[Annotation]:
-    """Peak and impulse of every contact above the curves, in as many rows as they need to stand apart."""
+    """Write peak and impulse of every contact above the curves, in as many rows as needed to avoid overlap."""
     contacts = one.contacts or ()
     width_in = panel_width_in(axes) - _BESIDE_IN
     number_s = _NUMBERS_IN / width_in * one.duration_s
@@ -192,17 +192,17 @@ def _name_contacts(axes: Axes, one: Demonstration) -> list[Annotation]:
     axes.set_ylim(low, high + len(ends) * row_n)
     style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6.5, "linespacing": 1.0}
     return [
-        axes.annotate(_told(contact), (at, high + row * row_n), **style)
+        axes.annotate(_numbers(contact), (at, high + row * row_n), **style)
         for contact, (at, row) in zip(contacts, places, strict=True)
     ]
 
 
-def _told(contact: Contact) -> str:
-    """Peak and impulse in numbers."""
+def _numbers(contact: Contact) -> str:
+    """Peak force and impulse as text."""
     return f"{contact.peak_force_n:.1f} N\n{np.hypot(*contact.impulse_n_s):.1f} N s"
 
 
 def _contact_handles(one: Demonstration) -> list[Patch]:
-    """Legend entry of contacts, where there is one."""
+    """Legend entry of contacts; none without contact."""
     look_of: dict[str, Any] = {"facecolor": colour_of(group_of(one)), "alpha": _OPACITY, "linewidth": 0}
     return [Patch(label="contact (peak, impulse)", **look_of)] if one.contacts else []

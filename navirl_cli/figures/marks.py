@@ -1,4 +1,4 @@
-"""What stands on every map: people, robot, start, goal, nominal path, and their entries in the legend."""
+"""Marks on every map: people, robot, start, goal, nominal path, and their entries in the legend."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,42 +17,42 @@ from navirl_cli.figures.ground import Window, frame, inside
 from navirl_cli.figures.scale import draw_scale_bar
 from navirl_cli.figures.style import look
 
-#: How opaque people are together where all of them overlap.
+#: Opacity where the discs of all people overlap.
 _OPACITY = 0.9
-#: Width of a person's outline on a plain map, and on colours, where it has to differ from the robot's, points.
+#: Width of a person's outline on a plain map, and on colours, where it must differ from the robot's, points.
 _OUTLINE_PT, _OUTLINE_ON_COLOURS_PT, _ROBOT_PT = 0.8, 1.2, 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """What is to be marked on a map, each (k, 2) m, map frame."""
+    """Places to be marked on a map, each (k, 2) m, map frame."""
 
     starts_m: FloatArray
     goals_m: FloatArray
     people_m: FloatArray
-    #: Draws the robot at its starts to scale, m; None leaves it out.
+    #: Radius of the robot, which is drawn at its starts to scale, m; None for no robot.
     robot_radius_m: float | None
 
 
 @dataclass(frozen=True)
 class Marks:
-    """What :func:`draw_marks` put on the axes."""
+    """The artists of :func:`draw_marks`."""
 
     #: Outlines of people and of the robot at its starts.
     people: list[Circle]
     robots: list[Circle]
-    #: Goals that are shown, and those beyond the border, one marker each.
+    #: Goals within the view, and a marker for each goal outside of it.
     goals: Line2D | None
     beyond: list[Line2D]
     nominal: Line2D | None
     scale_bar: Line2D
-    #: People who are shown at least in part.
+    #: People of whom at least a part is visible.
     seen: list[Circle]
-    #: Whether people are filled, who then stand there in one trial or another, not all at once.
+    #: Whether people are filled discs: the people of several trials, not all present at once.
     filled: bool
 
     def handles(self) -> list[Artist]:
-        """Legend entries of what is there, obstacles included."""
+        """Legend entries of the marks, including obstacles."""
         handles: list[Artist] = [] if self.nominal is None else [Line2D([], [], **_nominal())]
         handles.append(Line2D([], [], **_start()))
         if self.goals is not None:
@@ -63,7 +63,7 @@ class Marks:
             handles.append(_disc("robot", look().paper, _ROBOT_PT))
         if self.seen:
             alike = len({str(one.get_linestyle()) for one in self.seen}) == 1
-            label = f"person ({len(self.seen)} places)" if alike else "person (line as path's)"
+            label = f"person ({len(self.seen)} places)" if alike else "person (line style of path)"
             label = label if self.filled and len(self.seen) > 1 else "person"
             handles.append(_disc(label, look().person if self.filled else "none", self.seen[0].get_linewidth()))
         return [*handles, Patch(facecolor=look().obstacle, edgecolor="none", label="obstacle, inflated")]
@@ -78,14 +78,14 @@ def draw_marks(
     lines: Sequence[Any] = (),
     title: str = "",
 ) -> Marks:
-    """Draw what stands on a map, and the frame and a scale bar around it.
+    """Draw the marks of a map, its frame and a scale bar.
 
     Args:
-        axes: A map's, with paths or colours drawn already.
-        window: What is shown.
-        places: Where it stands; goals beyond the window are arrows at its border.
-        nominal: The nominal path of maps with colours; None of plain ones, on which people are filled.
-        lines: Line styles of the people's outlines, one each; none for plain ones.
+        axes: Those of the map, with paths or colours already drawn.
+        window: Limits of the view, m.
+        places: What to mark. Goals outside of the window are arrows at its border.
+        nominal: The nominal path of a map with colours; None on a plain map, where people are filled discs.
+        lines: Line styles of the people's outlines, one for each; empty for solid lines.
         title: Title of the panel.
 
     Returns:
@@ -105,8 +105,8 @@ def draw_marks(
 def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circle]:
     """Draw (p, 2) people, m, map frame, as circles to scale.
 
-    Filled ones lie below the paths, and are the more translucent the more there are: where people of several trials
-    overlap, all outlines are seen. Others are an outline that hides nothing of the colours below.
+    Filled discs are below the paths. Their opacity falls with the number of people, because people of several trials
+    overlap. Outlines without fill leave the colours below visible.
 
     Returns:
         The outlines.
@@ -126,7 +126,7 @@ def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circl
 
 
 def draw_starts(axes: Axes, starts_m: FloatArray, robot_radius_m: float | None) -> tuple[Line2D, list[Circle]]:
-    """Mark (k, 2) starts, m, map frame; where the robot's radius is known, its outline is drawn to scale.
+    """Mark (k, 2) starts, m, map frame, with the robot's outline to scale if its radius is known.
 
     Starts within a radius of each other share an outline.
 
@@ -144,10 +144,10 @@ def draw_starts(axes: Axes, starts_m: FloatArray, robot_radius_m: float | None) 
 
 
 def draw_goals(axes: Axes, goals_m: FloatArray, window: Window) -> tuple[Line2D | None, list[Line2D]]:
-    """Mark (k, 2) goals, m, map frame: stars, and at the window's border arrows towards those beyond it.
+    """Mark (k, 2) goals, m, map frame: stars, or arrows at the window's border towards goals outside of it.
 
     Returns:
-        The stars, None where there is no goal in the window, and the arrows.
+        The stars, or None without a goal in the window, and the arrows.
     """
     shown = inside(window, goals_m)
     stars = axes.plot(*goals_m[shown].T, zorder=6, **_goal())[0] if shown.any() else None
@@ -162,23 +162,23 @@ def draw_goals(axes: Axes, goals_m: FloatArray, window: Window) -> tuple[Line2D 
 
 
 def draw_nominal(axes: Axes, line_m: FloatArray) -> Line2D:
-    """Draw the nominal path, a (k, 2) line, m, map frame, legible on any colour."""
+    """Draw the nominal path, a (k, 2) line, m, map frame, visible on any colour."""
     halo = (withStroke(linewidth=2.2, foreground=look().paper),)
     (line,) = axes.plot(*line_m.T, zorder=3, path_effects=halo, **_nominal())
     return line
 
 
 def merged_handles(marks: Sequence[Marks]) -> list[Artist]:
-    """Legend entries of what is on any of several maps, each once."""
+    """Legend entries of the marks of several maps, each once."""
     handles: dict[str, Artist] = {}
-    for one in sorted(marks, key=lambda one: len(one.seen)):  # of people, the most places
+    for one in sorted(marks, key=lambda one: len(one.seen)):  # the last one counts: the most places of people
         handles = {_kind(handle): handle for handle in [*handles.values(), *one.handles()]}
-    order = ["nominal path", "start", "goal", "goal beyond", "robot", "person", "obstacle, inflated"]
+    order = ["nominal path", "start", "goal", "goal outside", "robot", "person", "obstacle, inflated"]
     return [handles[kind] for kind in order if kind in handles]
 
 
 def _kind(handle: Artist) -> str:
-    """What an entry is of, whatever its number."""
+    """An entry's label without its number."""
     return str(handle.get_label()).split(" (")[0]
 
 
@@ -195,11 +195,11 @@ def _goal() -> dict[str, Any]:
 
 
 def _beyond(direction_rad: float) -> dict[str, Any]:
-    """Look of a goal beyond the border, in a direction from the x axis."""
+    """Look of a goal outside of the view, in a direction from the x axis."""
     along = np.array([np.cos(direction_rad), np.sin(direction_rad)])
     aside = np.array([-along[1], along[0]])
     head = np.stack([along, 0.5 * aside - along, -0.5 * aside - along, along])
-    return {**_goal(), "marker": head, "markersize": 9, "label": "goal beyond"}
+    return {**_goal(), "marker": head, "markersize": 9, "label": "goal outside"}
 
 
 def _nominal() -> dict[str, Any]:
@@ -208,6 +208,6 @@ def _nominal() -> dict[str, Any]:
 
 
 def _disc(label: str, colour: str, edge_pt: float) -> Line2D:
-    """Legend entry of who is round."""
+    """Legend entry of a person or the robot."""
     line: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 7, "markeredgecolor": look().ink}
     return Line2D([], [], label=label, markerfacecolor=colour, markeredgewidth=edge_pt, **line)

@@ -1,4 +1,4 @@
-"""Paths drawn thin over the numbers of a map: demonstrated ones, and ones drawn from a policy."""
+"""Thin paths over the values of a map: demonstrated ones, and ones sampled from a policy."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,11 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.compare import LEARNT, PERSON_RADIUS_M
+from navirl_cli.evaluation.groups import by_group
 from navirl_cli.figures.style import colour_of, look
 
-#: Width of a path and of the light border that parts it from the colours below, points; opacity of many paths.
+#: Width of a path and of the light border around it, points; more paths than these have this opacity.
 _PATH_PT, _HALO_PT = 0.7, 1.3
 _MANY, _OPACITY = 10, 0.6
 #: Starts farther from each other than this are different tasks, m.
@@ -23,25 +24,36 @@ SAME_START_M = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """Paths of one kind."""
+    """Paths of one type."""
 
-    #: What they are, for the legend, and the key of their colour, as ``style.colour_of`` takes it.
+    #: Label in the legend, and key of the colour, as ``style.colour_of`` takes it.
     label: str
     key: str
     #: Each (k, 2) m, map frame.
     lines_m: Sequence[FloatArray]
 
 
-def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[Demonstration]:
-    """Demonstrations of one's task, itself included: on its map, with its people, from its start to its goal.
+def overlays_of(demonstrations: Iterable[Demonstration], sampled_m: Sequence[FloatArray] = ()) -> list[Overlay]:
+    """Driven paths by group and, above them, paths sampled from a policy.
 
-    Starts may lie SAME_START_M apart, ends a robot's radius, people a person's.
+    Args:
+        demonstrations: Those to draw.
+        sampled_m: Paths sampled from the policy, each (k, 2), m, map frame.
+    """
+    overlays = [Overlay(group, group, [one.xy_m for one in own]) for group, own in by_group(demonstrations).items()]
+    return [*overlays, *([Overlay("sampled from the policy", LEARNT, sampled_m)] if len(sampled_m) else [])]
+
+
+def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[Demonstration]:
+    """Demonstrations of the same task as one, including itself: same map, people, start and goal.
+
+    Starts may differ by SAME_START_M, ends by the robot's radius, people by a person's radius.
     """
     return [other for other in demonstrations if _same_task(other, one)]
 
 
 def _same_task(one: Demonstration, other: Demonstration) -> bool:
-    """Whether two demonstrations answer the same task."""
+    """Whether two demonstrations are of the same task."""
     maps = [(d.grid.shape, d.grid.resolution_m, d.grid.origin_m) for d in (one, other)]
     if maps[0] != maps[1] or len(one.people_m) != len(other.people_m):
         return False
@@ -52,17 +64,17 @@ def _same_task(one: Demonstration, other: Demonstration) -> bool:
 
 
 def draw_overlays(axes: Axes, overlays: Iterable[Overlay]) -> list[Line2D]:
-    """Draw paths thin over a map; many of a kind let through what is below.
+    """Draw thin paths over a map; many paths of one type are partly transparent.
 
     Returns:
         A line for each path.
     """
     lines = []
-    for kind in overlays:
-        opacity = 1.0 if len(kind.lines_m) <= _MANY else _OPACITY
+    for one in overlays:
+        opacity = 1.0 if len(one.lines_m) <= _MANY else _OPACITY
         halo = withStroke(linewidth=_HALO_PT, foreground=look().paper, alpha=opacity / 2)
-        for line_m in kind.lines_m:
-            lines += axes.plot(*line_m.T, color=colour_of(kind.key), linewidth=_PATH_PT, alpha=opacity, zorder=3.5)
+        for line_m in one.lines_m:
+            lines += axes.plot(*line_m.T, color=colour_of(one.key), linewidth=_PATH_PT, alpha=opacity, zorder=3.5)
             lines[-1].set_path_effects([halo])
     return lines
 
@@ -70,6 +82,6 @@ def draw_overlays(axes: Axes, overlays: Iterable[Overlay]) -> list[Line2D]:
 def overlay_handles(overlays: Iterable[Overlay]) -> list[Artist]:
     """Legend entries with the numbers of paths."""
     return [
-        Line2D([], [], color=colour_of(kind.key), linewidth=1.0, label=f"{kind.label} (n = {len(kind.lines_m)})")
-        for kind in overlays
+        Line2D([], [], color=colour_of(one.key), linewidth=1.0, label=f"{one.label} (n = {len(one.lines_m)})")
+        for one in overlays
     ]

@@ -1,4 +1,4 @@
-"""All demonstrated paths over their map (Fig. 3)."""
+"""All driven paths over their map (Fig. 3)."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, legend
 from navirl_cli.figures.marks import Marks, Places, draw_marks
 from navirl_cli.figures.style import colour_of, house_style
 
-#: Widths of a path and of its stretches in contact, points.
+#: Widths of a path and of its sections in contact, points.
 _PATH_PT, _CONTACT_PT = 0.7, 1.7
-#: People nearer to each other than this are one, m.
+#: People nearer to each other than this are at the same place, m.
 _SAME_M = 0.02
-#: Lines of paths with people at one place, at another, and so on; of more places than this all are alike.
+#: Line styles of paths by the places of people; with more places than styles, all are solid.
 _LINES: tuple[Any, ...] = ("-", (0, (5, 1.2)), (0, (1.2, 0.9)), (0, (5, 1.2, 1.2, 1.2)))
 
 
 @dataclass(frozen=True)
 class DrawnPaths:
-    """What :func:`draw_paths` put on the axes."""
+    """The artists of :func:`draw_paths`."""
 
     axes: Axes
     #: One for each map; demonstrations on the same cells share one.
@@ -57,24 +57,24 @@ def draw_paths(
     legend: bool = True,
     among: Sequence[Demonstration] = (),
 ) -> DrawnPaths:
-    """Draw the driven paths of demonstrations, one colour a group, thicker where the person pushed.
+    """Draw the driven paths of demonstrations, in one colour for each group, thicker in contact.
 
-    Where trials have people at different places, paths and the people of their trials have the same kind of line.
+    Where trials have people at different places, a path and the people of its trial have the same line style.
 
     Args:
         axes: Where to draw.
         demonstrations: All in the same map frame.
-        window_m: Borders of what is shown, m; None: around the paths, or the whole map where it is not much larger.
-        crop: Show no more than the paths' surroundings, where no window is given.
+        window_m: Limits of the view, m; None: the paths' surroundings, or all of a map that is not much larger.
+        crop: Show only the paths' surroundings, if no window is given.
         title: Title of the panel.
         legend: Whether to put a legend below.
-        among: Those of all panels beside each other, so that one kind of line means one place in all of them.
+        among: The demonstrations of all panels side by side: a line style then means the same place in all of them.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: There is no demonstration.
+        DemonstrationError: No demonstration.
     """
     if not demonstrations:
         raise DemonstrationError("no demonstration to draw")
@@ -101,14 +101,14 @@ def draw_paths(
 
 
 def window_of(demonstrations: Sequence[Demonstration], *, crop: bool) -> Window:
-    """What to show of demonstrations: their paths and goals, and the surroundings.
+    """Limits of the view of demonstrations: their paths and goals with a margin.
 
     Args:
         demonstrations: All in the same map frame.
-        crop: Whether to show no more than the paths' surroundings.
+        crop: Show only the paths' surroundings.
 
     Returns:
-        Borders, m.
+        Limits, m, map frame.
     """
     grids, paths = _maps(demonstrations), np.concatenate([one.xy_m for one in demonstrations])
     if crop:
@@ -117,7 +117,7 @@ def window_of(demonstrations: Sequence[Demonstration], *, crop: bool) -> Window:
 
 
 def _maps(demonstrations: Iterable[Demonstration]) -> list[Grid]:
-    """The maps of demonstrations; where several share cells, what one of them drove through is free."""
+    """The maps of demonstrations. On a shared map, cells through which any of them drove are free."""
     maps: dict[object, Grid] = {}
     for grid in (one.grid for one in demonstrations):
         place = grid.shape, grid.resolution_m, grid.origin_m
@@ -127,18 +127,18 @@ def _maps(demonstrations: Iterable[Demonstration]) -> list[Grid]:
 
 
 def _distinct(points_m: FloatArray) -> FloatArray:
-    """(k, 2) of (n, 2) points, m, without those that stand where another stands."""
+    """(k, 2) of (n, 2) points, m, without repeated places."""
     _, first = np.unique(np.round(points_m / _SAME_M), axis=0, return_index=True)
     return points_m[np.sort(first)]
 
 
 def _places(one: Demonstration) -> tuple[tuple[int, int], ...]:
-    """Where the people of a trial stand; equal for trials with people at the same places."""
+    """Places of the people of a trial: equal for trials with people at the same places."""
     return tuple(sorted((int(x), int(y)) for x, y in np.round(one.people_m / _SAME_M)))
 
 
 def _lines_of(demonstrations: Iterable[Demonstration]) -> dict[tuple[tuple[int, int], ...], Any]:
-    """Kinds of line by the places of people; all alike where there are too many of them."""
+    """Line styles by the places of people; all solid if there are too many places."""
     known = dict.fromkeys(_places(one) for one in demonstrations)
     peopled = [places for places in known if places]
     lines = _LINES if len(peopled) <= len(_LINES) else _LINES[:1] * len(peopled)
@@ -146,25 +146,25 @@ def _lines_of(demonstrations: Iterable[Demonstration]) -> dict[tuple[tuple[int, 
 
 
 def _line_of_person(person_m: FloatArray, line_of: dict[tuple[tuple[int, int], ...], Any]) -> Any:
-    """The line of the only trials in which a (2,) person stands there, m; the plain one of who stands in several."""
+    """Line style of a (2,) person, m: that of its trials, or solid if trials of several styles share the place."""
     x, y = np.round(person_m / _SAME_M)
     lines = [line for places, line in line_of.items() if (int(x), int(y)) in places]
     return lines[0] if len(lines) == 1 else _LINES[0]
 
 
-def _path(axes: Axes, one: Demonstration, colour: str, kind: Any) -> Line2D:
-    """One driven path."""
-    (line,) = axes.plot(*one.xy_m.T, color=colour, linewidth=_PATH_PT, linestyle=kind, zorder=3)
+def _path(axes: Axes, one: Demonstration, colour: str, style: Any) -> Line2D:
+    """Draw one driven path."""
+    (line,) = axes.plot(*one.xy_m.T, color=colour, linewidth=_PATH_PT, linestyle=style, zorder=3)
     return line
 
 
 def _contacts(axes: Axes, one: Demonstration, colour: str) -> list[Line2D]:
-    """The stretches of a path on which the person pushed."""
+    """Draw the sections of a path in contact."""
     band: dict[str, Any] = {"color": colour, "linewidth": _CONTACT_PT, "solid_capstyle": "butt", "zorder": 3}
-    return [axes.plot(*_stretch(one, contact).T, **band)[0] for contact in one.contacts or ()]
+    return [axes.plot(*_section(one, contact).T, **band)[0] for contact in one.contacts or ()]
 
 
-def _stretch(one: Demonstration, contact: Contact) -> FloatArray:
+def _section(one: Demonstration, contact: Contact) -> FloatArray:
     """(k, 2) m: the path between the first and the last instant of a contact."""
     inside = one.t_s[(one.t_s > contact.start_s) & (one.t_s < contact.end_s)]
     at = np.concatenate([[contact.start_s], inside, [contact.end_s]])
@@ -172,11 +172,11 @@ def _stretch(one: Demonstration, contact: Contact) -> FloatArray:
 
 
 def group_handles(groups: Iterable[str], counts: Mapping[str, int] | None = None) -> list[Artist]:
-    """Legend entries of groups, with their numbers of paths where told."""
+    """Legend entries of groups, with their numbers of paths if given."""
     labels = {group: group if counts is None else f"{group} (n = {counts[group]})" for group in groups}
     return [Line2D([], [], color=colour_of(group), linewidth=1.0, label=label) for group, label in labels.items()]
 
 
 def contact_handle() -> Artist:
-    """Legend entry of the stretches in contact, whatever their group."""
+    """Legend entry of sections in contact, for all groups."""
     return Line2D([], [], color="0.5", linewidth=_CONTACT_PT, label="in contact")

@@ -1,4 +1,4 @@
-"""Propagated policy and state reward of one reward in several scenes, a row each (Figs. 8 and 9)."""
+"""Propagated policy and state reward, one row for each scene (Figs. 8 and 9)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 
 from navirl_cli.errors import SceneError
-from navirl_cli.figures.cells import EXTEND, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.cells import EXTEND, REWARD, VISITS, DrawnCells, draw_policy, draw_reward
 from navirl_cli.figures.ground import Window
 from navirl_cli.figures.marks import merged_handles
 from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
@@ -18,15 +18,13 @@ from navirl_cli.irl.solved import SolvedScene
 
 #: A title, and a scene under a reward.
 TitledScene = tuple[str, SolvedScene]
-#: What the colour bars show.
-VISITS, REWARD = "expected visits", "state reward per step (without cost of way)"
-#: Mean width of a letter, of what stands beside a map, and thickness of a colour bar, inches.
+#: Mean width of a letter, width of the labels beside a map, and thickness of a colour bar, inches.
 _LETTER_IN, _BESIDE_IN, _BAR_IN = 0.055, 0.35, 0.08
 
 
 @dataclass(frozen=True)
 class DrawnPolicies:
-    """What :func:`draw_policy_and_reward` put on the axes, by scene."""
+    """The artists of :func:`draw_policy_and_reward`, by scene."""
 
     #: All share one colour bar.
     policies: list[DrawnCells]
@@ -39,22 +37,22 @@ class DrawnPolicies:
 def draw_policy_and_reward(
     axes: Sequence[Axes], scenes: Sequence[TitledScene], robot_radius_m: float, window_m: Window | None = None
 ) -> DrawnPolicies:
-    """Draw where a policy leads and the reward that it follows side by side, a row for each scene.
+    """Draw the propagated policy and the state reward side by side, one row for each scene.
 
-    Equal colours are equal numbers in all scenes: one colour bar stands above all policies and one above all rewards.
+    Equal colours are equal values in all scenes. One colour bar is above all policies and one above all rewards.
 
     Args:
-        axes: Two for each scene in rows of two, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
+        axes: Two for each scene, in rows of two, as :func:`navirl_cli.figures.sheet.new_figure` gives them.
         scenes: Several scenes under one reward, or one scene under several, with their titles.
-        robot_radius_m: Draws the robot at its start to scale, m.
-        window_m: Borders of what every map shows, m; None: around each scene's paths.
+        robot_radius_m: Radius of the robot, which is drawn at its start to scale, m.
+        window_m: Limits of the view of every map, m; None: the surroundings of each scene's paths.
 
     Returns:
         The artists.
 
     Raises:
-        SceneError: There is no scene.
-        ValueError: There is not one number for each state.
+        SceneError: No scene.
+        ValueError: The number of values is not the number of states.
     """
     if not scenes:
         raise SceneError("no scene to draw")
@@ -63,7 +61,7 @@ def draw_policy_and_reward(
     for (title, one), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
         policies.append(draw_policy(left, one.scene, one.visits, window_m=window_m, **look))
         rewards.append(draw_reward(right, one.scene, one.reward_by_cell, window_m=policies[-1].window_m, **look))
-        # The title is the row's: it may reach over the panel on the right, which has none.
+        # The title is that of the row: it may extend over the panel on the right.
         left.set_title(fill(title, int(2 * (panel_width_in(left) - _BESIDE_IN) / _LETTER_IN)), loc="left")
     alike = len({drawn.window_m for drawn in policies}) == 1
     for rows in [axes] if alike else [axes[at : at + 2] for at in range(0, len(axes), 2)]:
@@ -73,7 +71,7 @@ def draw_policy_and_reward(
 
 
 def _share(drawn: Sequence[DrawnCells], label: str) -> list[DrawnCells]:
-    """Give equal numbers equal colours in all panels, and all one colour bar above them in place of one each."""
+    """Give all panels the same range of colours, and one common colour bar above them."""
     clims = [one.image.get_clim() for one in drawn]
     low, high = min(clim[0] for clim in clims), max(clim[1] for clim in clims)
     tables = [table for one in drawn if (table := one.image.get_array()) is not None]

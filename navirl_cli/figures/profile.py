@@ -1,4 +1,4 @@
-"""Profile likelihoods: how the best log-likelihood falls on both sides of an estimate."""
+"""Profile likelihoods: the largest log-likelihood with one parameter fixed, on both sides of its estimate."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,13 +12,14 @@ from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look, panel_width_in
 from navirl_cli.irl.profile import Profile, fall_at
 
-#: The parameters as the paper writes them.
+#: The parameters in the paper's notation.
 SYMBOLS = {"c0": "$c_0$", "a_g": "$a_g$", "a_p": "$a_p$", "sigma_p": r"$\sigma_p$"}
-#: The curve is drawn down to so many times the fall at the interval's ends.
+#: The curve is drawn down to this multiple of the fall at the interval's ends.
 DEPTH = 1.6
-#: Height over width of a panel, what a second line of the title and of the label adds, and the greatest height, inches.
+#: Ratio of height to width of a panel; height of a second line of title and label, and largest height, inches.
 ASPECT, MORE_IN, TALLEST_IN = 0.72, 0.6, 2.6
-#: A panel narrower than the first cannot be read; one narrower than the second has fewer ticks and a smaller title, in.
+#: A panel narrower than the first is not legible; one narrower than the second has fewer ticks and a smaller title,
+#: inches.
 NARROWEST_IN, NARROW_IN = 1.6, 2.2
 
 
@@ -26,22 +27,22 @@ def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_i
     """Draw profile likelihoods side by side.
 
     Args:
-        profiles: The profiles, at least one, from left to right.
-        units: Units of the parameters by name; a pure number's is empty or missing.
+        profiles: From left to right, at least one.
+        units: Units of the parameters by name; empty or missing for a dimensionless parameter.
         width_in: Width of the figure, inches; COLUMN_IN or PAGE_IN for a paper.
 
     Returns:
-        The figure, as high as it needs to be.
+        The figure, of the height that it needs.
 
     Raises:
-        ArtefactError: There are more than can be read at this width, or one has nothing to draw.
+        ArtefactError: More profiles than are legible at this width, or a flat profile.
     """
     count = len(profiles)
     if width_in / count < NARROWEST_IN:
-        wider = "use --wide, or" if PAGE_IN / count >= NARROWEST_IN else "use"
+        wider = "set `wide`, or fit" if PAGE_IN / count >= NARROWEST_IN else "fit"
         raise ArtefactError(
-            f"{count} profiles side by side cannot be read in {width_in:g} in, which has room for "
-            f"{int(width_in / NARROWEST_IN)}: {wider} fewer --profile in navirl fit"
+            f"{count} profiles side by side are not legible in {width_in:g} in: expected "
+            f"{int(width_in / NARROWEST_IN)} at most; {wider} again with fewer parameters in `profile`"
         )
     height_in = min(width_in / count * ASPECT + (MORE_IN if count > 1 else 0.0), TALLEST_IN)
     figure, axes = new_figure(width_in, height_in, count)
@@ -57,19 +58,22 @@ def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_i
 def draw_profile(axes: Axes, profile: Profile, unit: str) -> None:
     """Draw the profile likelihood of one parameter with its interval.
 
-    Between the values that were followed, which are marked, the root of the fall is drawn straight. Where the interval
-    is open, the likelihood never falls to the line.
+    Computed values are marked. Between them, the square root of the fall is interpolated linearly. At an open end of
+    the interval, the likelihood does not fall to the dashed line.
 
     Args:
         axes: Where to draw.
-        profile: The profile; the estimate is where it is highest.
-        unit: The parameter's unit, empty for a pure number.
+        profile: The profile; its maximum is the estimate.
+        unit: The parameter's unit; empty for a dimensionless parameter.
 
     Raises:
-        ArtefactError: It falls nowhere, so that there is nothing to draw.
+        ArtefactError: The profile is flat.
     """
     if float(profile.relative.max() - profile.relative.min()) <= 0:
-        raise ArtefactError(f"the profile of {profile.name} is flat: there is nothing to draw")
+        raise ArtefactError(
+            f"profile of {profile.name}: expected a log-likelihood with a maximum, found a flat one; the "
+            f"demonstrations do not identify {profile.name}"
+        )
     fall, colour = fall_at(profile.level), colour_of("learnt")
     top = int(np.argmax(profile.relative))
     best = float(profile.values[top])
@@ -88,12 +92,12 @@ def draw_profile(axes: Axes, profile: Profile, unit: str) -> None:
 
 
 def _write(axes: Axes, profile: Profile, best: float, unit: str) -> None:
-    """Write title, labels and ticks: in a panel that has others beside it in two lines, and in a narrow one smaller."""
+    """Write title, labels and ticks. Panels side by side have titles in two lines; narrow ones a smaller font."""
     spec = axes.get_subplotspec()
     alone = spec is None or spec.get_gridspec().ncols == 1
     narrow = panel_width_in(axes) < NARROW_IN
     left, right = axes.get_xlim()
-    # An estimate near the left end has no room beside it there.
+    # Left of an estimate near the left end is no room.
     side, reach = ("left", 3) if best - left < (right - left) / 4 else ("right", -3)
     label, at = f"{100 * profile.level:.4g} %", (best, -fall_at(profile.level))
     axes.annotate(label, at, (reach, 1.5), textcoords="offset points", ha=side, va="bottom", fontsize=7)

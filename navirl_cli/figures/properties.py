@@ -1,7 +1,7 @@
-"""Properties of paths by group as bars (Fig. 7)."""
+"""Properties of paths by group, as bars (Fig. 7)."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -21,28 +21,28 @@ from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
-#: What the figure says of itself.
+#: Note below the panels.
 NOTE = "bars: mean, whiskers: standard deviation"
-#: Share of a figure's width that the bars' labels may take, and the mean width of one of their letters, inches.
+#: Largest share of a figure's width for the bars' labels; mean width of a letter, inches.
 _LABELLED, _LETTER_IN = 0.25, 0.055
-#: Height of a line of text and of the space between two bars, inches.
+#: Height of a line of text, and distance between two bars, inches.
 _LINE_IN, _BETWEEN_IN = 0.125, 0.06
-#: Height of what stands below the bars, inches; panels narrower than this have labels in two lines of so many letters.
+#: Height of the labels below the bars; panels narrower than this, inches, have labels in lines of so many letters.
 _BELOW_IN, _NARROW_IN, _SHORT = 0.58, 1.8, 13
-#: Most intervals between ticks; the share of a panel's width in which they stand, and room between numbers, inches.
+#: Largest number of intervals between ticks; share of a panel's width for them; least distance between numbers, inches.
 _INTERVALS, _TICKED, _APART_IN = 4, 0.68, 0.04
 _WHISKER: dict[str, Any] = {"elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8}
 
 
 @dataclass(frozen=True)
 class PropertyBar:
-    """One bar of every panel: the paths of one group, or of one kind."""
+    """One bar of every panel: paths of one group and type."""
 
     label: str
     #: Key of its colour, as :func:`navirl_cli.figures.style.colour_of` takes it.
     key: str
     mean: Values
-    #: Standard deviations; NaN where one path has none.
+    #: Standard deviations; NaN for a single path.
     std: Values
     #: Number of paths.
     count: int
@@ -50,37 +50,37 @@ class PropertyBar:
 
 @dataclass(frozen=True)
 class DrawnProperties:
-    """What :func:`draw_properties` put on the axes, by panel."""
+    """The artists of :func:`draw_properties`, by panel."""
 
     axes: list[Axes]
     bars: list[BarContainer]
 
 
-def bars_of(rows: Iterable[GroupMetrics]) -> list[PropertyBar]:
-    """Bars of measured paths, one for each row.
+def bars_of(rows: Iterable[GroupMetrics], learnt_from: Container[str] | None = None) -> list[PropertyBar]:
+    """Bars of driven and learnt paths.
+
+    Learnt paths go from cell to cell. They are compared with driven paths through the centres of cells.
 
     Args:
-        rows: Metrics by group and type of path, from top to bottom.
+        rows: Metrics by group and type of path, from top to bottom. Baselines have no bars.
+        learnt_from: Groups with bars of learnt paths and of driven paths through the centres of cells; None for all.
 
     Returns:
-        The bars. Those of driven paths have the name of their group; others add the type of path. Learnt paths have a
-        colour of their own, all others that of their group.
+        The bars. Those of driven paths have the name of their group; others add the type of path. Learnt paths have
+        their own colour, all others that of their group.
     """
-    suffix = {DRIVEN: "", ON_GRID: ", on grid"}
-    return [
-        PropertyBar(
-            row.group + suffix.get(row.kind, f", {row.kind}"),
-            LEARNT if row.kind.split(", ")[0] == LEARNT else row.group,
-            row.mean,
-            row.std,
-            row.count,
-        )
-        for row in rows
-    ]
+    bars = []
+    for row in rows:
+        if row.kind == DRIVEN:
+            bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
+        elif row.kind in {ON_GRID, LEARNT} and (learnt_from is None or row.group in learnt_from):
+            name, key = ("learnt", LEARNT) if row.kind == LEARNT else ("on grid", row.group)
+            bars.append(PropertyBar(f"{row.group}, {name}", key, row.mean, row.std, row.count))
+    return bars
 
 
 def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
-    """Height of a figure of these bars in which no two labels touch, inches.
+    """Height of a figure of these bars in which no labels overlap, inches.
 
     Args:
         bars: The bars.
@@ -93,24 +93,24 @@ def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
 
 @house_style()
 def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnProperties:
-    """Draw mean and standard deviation of every metric, a panel each; bars lie, so that long labels stay readable.
+    """Draw mean and standard deviation of every metric as horizontal bars, one panel for each.
 
-    Bars start at 0; a note below says what bars and whiskers are. A mean that does not exist (the distance to people
-    where there is nobody) is said to be missing.
+    Bars start at 0. A note below explains bars and whiskers. A mean that does not exist, such as the distance to people
+    in scenes without people, is marked "n/a".
 
     Args:
-        axes: One for each of PAPER_METRICS, side by side, :func:`height_for` inches high with labels. The first names
-            the bars and their numbers of paths.
+        axes: One for each of PAPER_METRICS, side by side, :func:`height_for` inches high with labels. The first has the
+            labels of the bars.
         bars: From top to bottom.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: There is no bar.
+        DemonstrationError: No bars.
     """
     if not bars:
-        raise DemonstrationError("no paths to compare")
+        raise DemonstrationError("no path properties to draw")
     drawn = [_draw_panel(panel, metric, bars) for panel, metric in zip(axes, PAPER_METRICS, strict=True)]
     width_in = panel_width_in(axes[0]) * len(axes)
     axes[0].set_yticks(range(len(bars)), [_label(bar, width_in) for bar in bars])
@@ -119,7 +119,7 @@ def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnP
 
 
 def _label(bar: PropertyBar, width_in: float) -> str:
-    """A bar's name and number of paths, in lines that leave the panels their share of the figure's width.
+    """A bar's label with its number of paths, in lines that leave room for the panels.
 
     A number stays on the line of its word: "cycle 2".
     """
@@ -129,7 +129,7 @@ def _label(bar: PropertyBar, width_in: float) -> str:
 
 
 def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarContainer:
-    """One metric."""
+    """Draw one metric."""
     at = np.arange(len(bars))
     mean = np.array([bar.mean[metric.name] for bar in bars], dtype=float)
     std = np.array([bar.std[metric.name] for bar in bars], dtype=float)
@@ -138,7 +138,7 @@ def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarC
     whisker = {**_WHISKER, "ecolor": ink}
     drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=ink, linewidth=0.5, error_kw=whisker)
     for y in at[np.isnan(mean)]:
-        axes.annotate("none", (0.0, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
+        axes.annotate("n/a", (0.0, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
     narrow = panel_width_in(axes) < _NARROW_IN
     label = f"{metric.label} [{metric.unit}]"
     axes.set_xlabel(fill(label, _SHORT) if narrow else label)
@@ -154,7 +154,7 @@ def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarC
 
 
 def _limits(mean: FloatArray, std: FloatArray) -> tuple[float, float]:
-    """Borders of the metric's axis: from 0, or from below the lowest whisker, to a little above the highest."""
+    """Limits of the metric's axis: from 0, or below the lowest whisker, to above the highest whisker."""
     spread = np.nan_to_num(std)
     ends = np.concatenate([[0.0], (mean - spread)[~np.isnan(mean)], (mean + spread)[~np.isnan(mean)]])
     low, high = float(ends.min()), float(ends.max())
@@ -163,7 +163,7 @@ def _limits(mean: FloatArray, std: FloatArray) -> tuple[float, float]:
 
 
 def _ticks(low: float, high: float, width_in: float) -> tuple[FloatArray, list[str]]:
-    """Numbers below an axis of a width, and their texts: three or more where they fit, fewer where not."""
+    """Ticks of an axis of a width, and their texts: at least three if they fit."""
     font = FontProperties(size=rcParams["xtick.labelsize"])
     for intervals in range(_INTERVALS, 0, -1):
         locator = MaxNLocator(intervals, steps=[1, 2, 4, 5, 10], min_n_ticks=min(3, intervals))

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import properties
@@ -30,14 +29,14 @@ def draw_report(
 
     Args:
         demonstrations: All.
-        parameters: Names and units of what was learnt.
+        parameters: Names and units of the learnt parameters.
         shown: The demonstration whose scene shows the policy, and this scene under the learnt reward.
         groups: Metrics, as :func:`navirl_cli.evaluation.compare.compare` gives them.
-        profiles: Profile likelihoods; none where none were followed.
+        profiles: Profile likelihoods; may be empty.
         folder: Where to write .png files.
 
     Returns:
-        The files by name.
+        The files by name: paths, policy, properties, and profile if there are profiles.
     """
     files = {name: folder / f"{name}.png" for name in ("paths", "policy", "properties", "profile")}
     figure, axes = new_figure(PAGE_IN)
@@ -47,7 +46,7 @@ def draw_report(
     figure, axes = new_figure(PAGE_IN, panels=2, columns=2)
     draw_policy_and_reward(axes, [(f"scene of {one.id}", scene)], one.robot_radius_m)
     save_figure(figure, files["policy"])
-    bars = properties.bars_of(row for row in groups if row.kind in {DRIVEN, ON_GRID, LEARNT})
+    bars = properties.bars_of(groups)
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     save_figure(figure, files["properties"], trim=False)

@@ -1,4 +1,4 @@
-"""A scale bar where it hides least."""
+"""A scale bar in the corner of a map where it hides least."""
 
 from itertools import product
 from typing import Any
@@ -15,20 +15,20 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.figures.ground import Window, inside
 from navirl_cli.figures.style import look, panel_width_in
 
-#: A bar of 1 m, or of the next length that is as easily read, takes this share of the map's width.
+#: Least and largest length of a bar as a share of the map's width.
 _LEAST, _MOST = 0.08, 0.4
-#: Its distance from the borders, and height and least width of bar and number, inches.
+#: Distance from the borders, and height and least width of bar and number, inches.
 _PAD_IN, _HIGH_IN, _WIDE_IN = 0.07, 0.2, 0.25
-#: What is drawn is looked at every so many metres.
+#: Lines are sampled at this distance, m.
 _SPACING_M = 0.1
 
 
 def draw_scale_bar(axes: Axes, window: Window) -> tuple[Line2D, Annotation]:
-    """Draw a scale bar of 1 m, or of what fits, into the corner of a map that holds least of paths, people and marks.
+    """Draw a scale bar of 1 m, or of a length that fits, into the emptiest corner of a map.
 
     Args:
-        axes: A map's, with everything else drawn already.
-        window: What it shows.
+        axes: Those of the map, with everything else already drawn.
+        window: Limits of the view, m.
 
     Returns:
         The bar and its number.
@@ -46,15 +46,15 @@ def free_corner(axes: Axes, window: Window, length: float) -> tuple[FloatArray, 
     """The corner of a map in which a mark with a number hides least.
 
     Args:
-        axes: A map's.
-        window: What it shows.
+        axes: Those of the map.
+        window: Limits of the view, m.
         length: Length of the mark along x, m.
 
     Returns:
-        (2,) where the mark's middle belongs, m, and whether its number belongs below it, as in the upper corners.
+        (2,) place of the mark's middle, m, and whether its number is below it, as in the upper corners.
     """
     x0, x1, y0, y1 = window
-    inch_m = (x1 - x0) / panel_width_in(axes)  # a little less than it is: labels stand beside the map
+    inch_m = (x1 - x0) / panel_width_in(axes)  # a little too small: labels are beside the map
     pad, high, wide = _PAD_IN * inch_m, _HIGH_IN * inch_m, max(length, _WIDE_IN * inch_m)
     busy = _drawn_m(axes)
     hidden = {}
@@ -62,13 +62,13 @@ def free_corner(axes: Axes, window: Window, length: float) -> tuple[FloatArray, 
         left, low = (x1 - pad - wide if right else x0 + pad), (y1 - pad - high if top else y0 + pad)
         box = (left - pad, left + wide + pad, low - pad, low + high + pad)
         hidden[right, top] = int(inside(box, busy).sum())
-    right, top = min(hidden, key=lambda corner: hidden[corner])  # of equal ones the first
+    right, top = min(hidden, key=lambda corner: hidden[corner])  # the first of equal ones
     x = x1 - pad - wide / 2 if right else x0 + pad + wide / 2
     return np.array([x, y1 - pad if top else y0 + pad]), top
 
 
 def write_beside(axes: Axes, text: str, middle: FloatArray, *, top: bool) -> Annotation:
-    """Write a mark's number above its (2,) middle, or below it in an upper corner, legible on any colour."""
+    """Write a mark's number above its (2,) middle, m, or below it in an upper corner, legible on any colour."""
     side: dict[str, Any] = {"ha": "center", "va": "top" if top else "bottom", "fontsize": 7, "zorder": 7}
     shift = (0.0, -2.0 if top else 2.0)
     number = axes.annotate(text, (middle[0], middle[1]), shift, textcoords="offset points", **side)
@@ -77,7 +77,7 @@ def write_beside(axes: Axes, text: str, middle: FloatArray, *, top: bool) -> Ann
 
 
 def length_m(width_m: float) -> float:
-    """Length of the bar of a map of a width: 1 m where it can be seen and leaves room, else 1, 2 or 5 times 10^k m."""
+    """Length of the bar of a map of a width, m: 1 if it is visible and leaves room, otherwise 1, 2 or 5 times 10^k."""
     if _LEAST * width_m <= 1.0 <= _MOST * width_m:
         return 1.0
     power = 10.0 ** np.floor(np.log10(_MOST / 2 * width_m))
@@ -92,9 +92,9 @@ def _drawn_m(axes: Axes) -> FloatArray:
         if line.get_linestyle() == "None" or len(corners) < 2:
             points.append(corners)
             continue
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-        at = np.linspace(0.0, way[-1], max(2, int(way[-1] / _SPACING_M)))
-        points.append(np.stack([np.interp(at, way, axis) for axis in corners.T], axis=1))
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+        at = np.linspace(0.0, along[-1], max(2, int(along[-1] / _SPACING_M)))
+        points.append(np.stack([np.interp(at, along, axis) for axis in corners.T], axis=1))
     around = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     points += [circle * one.radius + one.center for one in axes.patches if isinstance(one, Circle)]

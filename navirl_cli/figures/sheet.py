@@ -1,4 +1,4 @@
-"""Sheets of paper: figures opened without a display, and saved whole or not at all."""
+"""Figures: opened without a display, laid out, and saved completely or not at all."""
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
@@ -16,12 +16,12 @@ from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, house_style, look
 from navirl_cli.files import check_writable, replacing
 
-#: By format, what a file states about itself: nothing that changes from day to day. matplotlib loads what writes a
-#: format when it is needed; none of them needs a display.
+#: Metadata of a file by format, without dates. matplotlib loads the writer of a format when it is needed; none needs a
+#: display.
 METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
     {"png": {}, "pdf": {"CreationDate": None, "ModDate": None}, "svg": {"Date": None}}
 )
-#: White border around everything, and the waste of height that is tolerated, inches.
+#: White border around everything, and empty height that is tolerated, inches.
 PAD_IN, SLACK_IN = 0.03, 0.02
 _MOST_TRIMS = 10
 
@@ -35,13 +35,13 @@ def new_figure(
     *,
     managed: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """Open a figure with panels side by side, or in rows.
+    """Open a figure with panels in one row or in several.
 
     Args:
         width_in: Width, inches; COLUMN_IN or PAGE_IN for a paper.
-        height_in: Height, inches; None leaves as much as maps need, :func:`save_figure` takes away what is empty.
+        height_in: Height, inches; None: enough for maps, of which :func:`save_figure` removes the empty height.
         panels: Number of panels.
-        columns: Panels in a row, the last of which may be short of some; None puts all in one.
+        columns: Panels in a row; the last row may have fewer. None puts all into one row.
         managed: Whether pyplot knows the figure, so that notebooks and ``matplotlib.pyplot.show()`` show it.
 
     Returns:
@@ -62,7 +62,7 @@ def new_figure(
 
 
 def outer_labels(axes: Sequence[Axes]) -> None:
-    """Leave only the outermost of panels that show the same with labels and numbers on their axes.
+    """Keep labels and numbers only on the outermost axes of panels with the same view.
 
     Args:
         axes: Row by row, as :func:`new_figure` gives them.
@@ -70,7 +70,7 @@ def outer_labels(axes: Sequence[Axes]) -> None:
     spec = axes[0].get_subplotspec()
     columns = 1 if spec is None else spec.get_gridspec().ncols
     for number, panel in enumerate(axes):
-        if (number // columns + 2) * columns <= len(axes):  # a full row stands below
+        if (number // columns + 2) * columns <= len(axes):  # a full row is below
             panel.set_xlabel("")
             panel.tick_params(labelbottom=False)
         if number % columns:
@@ -80,9 +80,9 @@ def outer_labels(axes: Sequence[Axes]) -> None:
 
 @house_style()
 def common_legend(axes: Sequence[Axes], handles: Sequence[Artist]) -> Legend:
-    """Put one legend where the last row of panels has a free place, or below them all.
+    """Put one legend into a free place of the last row of panels, or below all panels.
 
-    Below, it is read row by row, in as many columns as fit.
+    Below, it is ordered row by row, in as many columns as fit.
 
     Args:
         axes: All panels of a figure, row by row, as :func:`new_figure` gives them.
@@ -109,7 +109,7 @@ def common_legend(axes: Sequence[Axes], handles: Sequence[Artist]) -> Legend:
 
 @house_style()
 def trim_height(figure: Figure) -> None:
-    """Take away height that maps of a fixed aspect leave empty; the width stays.
+    """Remove height that maps of a fixed aspect ratio leave empty. The width stays.
 
     Args:
         figure: Changed in place. Panels that fill their height keep it.
@@ -126,11 +126,11 @@ def trim_height(figure: Figure) -> None:
 
 
 def _filled_in(figure: Figure) -> float:
-    """Height that panels and legends take, with the border around each row of them, inches."""
-    # a legend in a free place fills less of it than its hidden axes
+    """Height of panels and legends with the border around each row, inches."""
+    # a legend in a free place is smaller than its hidden axes
     panels = (axes if axes.axison else axes.get_legend() for axes in figure.axes)
     extents = [part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None]
-    touching = 2 * PAD_IN * figure.dpi  # rows may come that near before the layout has settled
+    touching = 2 * PAD_IN * figure.dpi  # rows may be that near before the layout is final
     rows: list[list[float]] = []
     for y0, y1 in sorted((extent.y0, extent.y1) for extent in extents if extent is not None):
         if rows and y0 < rows[-1][1] - touching:
@@ -142,11 +142,11 @@ def _filled_in(figure: Figure) -> float:
 
 @house_style()
 def settle(figure: Figure, *, trim: bool = True) -> None:
-    """Fix the layout, so that saving a figure in several formats works it out once.
+    """Fix the layout: a figure that is saved in several formats is laid out once.
 
     Args:
         figure: Changed in place.
-        trim: Take away empty height first, as :func:`trim_height`.
+        trim: Remove empty height first, as :func:`trim_height`.
     """
     if trim:
         trim_height(figure)
@@ -155,11 +155,11 @@ def settle(figure: Figure, *, trim: bool = True) -> None:
 
 
 def check_target(path: Path, *, force: bool = False) -> str:
-    """The format in which a figure would be saved; refuse early what could not be saved later.
+    """The format of a figure's file; refuse early what could not be saved later.
 
     Args:
         path: File to be written.
-        force: An existing file may be replaced.
+        force: Whether an existing file may be replaced.
 
     Returns:
         png, pdf or svg.
@@ -170,7 +170,9 @@ def check_target(path: Path, *, force: bool = False) -> str:
     extension = path.suffix.lower().removeprefix(".")
     if extension not in METADATA:
         found = f'the extension "{path.suffix}"' if path.suffix else "no extension"
-        raise ArtefactError(f"{path}: a figure is saved as .png, .pdf or .svg, found {found}; rename the output")
+        raise ArtefactError(
+            f"{path}: expected a name that ends in .png, .pdf or .svg, found {found}; rename the output"
+        )
     check_writable(path, force=force)
     return extension
 
@@ -179,13 +181,13 @@ def check_target(path: Path, *, force: bool = False) -> str:
 def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool = True) -> None:
     """Save a figure in the format of its file's extension: the same figure gives the same bytes.
 
-    The file appears whole or not at all.
+    The file appears completely or not at all.
 
     Args:
         figure: The figure.
         path: A .png, .pdf or .svg file.
         force: Replace an existing file.
-        trim: Take away empty height first, as :func:`trim_height`.
+        trim: Remove empty height first, as :func:`trim_height`.
 
     Raises:
         ArtefactError: As in :func:`check_target`, or writing fails.

@@ -1,4 +1,4 @@
-"""All figures of a study, from its numbers to files."""
+"""All figures of a study, as files."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -8,7 +8,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
@@ -24,7 +23,7 @@ from navirl_cli.study.unseen import PooledPolicy
 
 #: Formats of every figure: for reports, and for papers.
 FORMATS = ("png", "pdf")
-#: A figure drawn, and whether empty height may be cut away.
+#: A drawn figure, and whether to remove empty height.
 _Drawn = tuple[Figure, bool]
 
 
@@ -38,14 +37,14 @@ def draw_study(
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
 ) -> dict[str, Path]:
-    """Draw whatever the study's data allow.
+    """Draw all figures of a study for which it has data.
 
     Args:
-        study: The numbers.
+        study: Its results.
         pooled: Where the pooled reward leads.
-        bars: Answers to a questionnaire; none where there is none.
+        bars: Answers to a questionnaire; may be empty.
         folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.reports.study.FIGURES`.
-        force: Replace existing files; those of an earlier run that have no data now are deleted.
+        force: Replace existing files. Files of an earlier run without data now are deleted.
         progress: Called with the number of figures drawn and the name of the last.
         executor: Where to draw; by default local processes.
 
@@ -116,7 +115,7 @@ def _answers(bars: Sequence[Shares]) -> _Drawn:
 
 
 def _properties(study: Study) -> _Drawn:
-    bars = properties.bars_of(row for row in study.groups if row.kind == DRIVEN)
+    bars = properties.bars_of(study.groups, learnt_from=())
     figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
     properties.draw_properties(axes, bars)
     return figure, False

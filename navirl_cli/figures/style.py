@@ -1,4 +1,4 @@
-"""What all figures share: sizes of a page, fonts, looks for paper and screen, and one colour for one thing."""
+"""Style of all figures: sizes of a page, fonts, looks for paper and screen, and colours."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,13 +20,13 @@ COLUMN_IN, PAGE_IN = 3.5, 7.16
 #: Resolution of bitmaps, and of images inside vector files, dots per inch.
 DPI = 300
 
-#: Ink on paper; what is drawn in other looks too asks :func:`look` for its ink.
+#: Ink on paper. Figures that other looks have too take the ink of :func:`look`.
 INK = "#000000"
-#: Colour of whatever is none of COLOURS.
+#: Colour of any other key.
 OTHER_COLOUR = "#8C8C8C"
 
-#: Colours by key (Okabe and Ito, Color Universal Design: apart for every common kind of colour vision; force's cycles
-#: differ in lightness, so that grey print keeps them apart). A replay has a darker shade of what it replays.
+#: Colours by key (Okabe and Ito, Color Universal Design: distinct for every common type of colour vision). Cycles of
+#: force differ in lightness and stay distinct in grey print. A replay has a darker shade of what it replays.
 COLOURS: Mapping[str, str] = MappingProxyType(
     {
         "force": "#0072B2",
@@ -46,7 +46,7 @@ COLOURS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-#: The same hues on near-black: light where they were dark, and force's cycles from light to dark as on paper.
+#: The same hues on near-black: light instead of dark, with the cycles of force from light to dark as on paper.
 DARK_COLOURS: Mapping[str, str] = MappingProxyType(
     {
         "force": "#45A3E8",
@@ -69,22 +69,22 @@ DARK_COLOURS: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Look:
-    """How figures look on what they are shown on; their sizes in inches do not depend on it."""
+    """Look of figures on paper or on a screen; sizes in inches do not depend on it."""
 
-    #: Colours of lines and letters, of what they stand on, of obstacles and of people.
+    #: Colours of lines and letters, of the background, of obstacles and of people.
     ink: str
     paper: str
     obstacle: str
     person: str
     #: Colours by key, as :data:`COLOURS`.
     colours: Mapping[str, str]
-    #: Colour map of numbers that are the stronger the higher they are, and the colour of what is below its range.
+    #: Colour map of intensities.
     intensity: str
     #: Resolution of bitmaps, and of images inside vector files, dots per inch.
     dpi: int
 
 
-#: For print, for a bright screen (twice the pixels), and for a dark one, as slides have.
+#: For print, for a light screen (twice the pixels), and for dark slides.
 LOOKS: Mapping[str, Look] = MappingProxyType(
     {
         "paper": Look(INK, "#FFFFFF", "#D4D4D4", "#F0E442", COLOURS, "viridis_r", DPI),
@@ -94,8 +94,8 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
 )
 _LOOK: ContextVar[Look] = ContextVar("look", default=LOOKS["paper"])
 
-#: Colours of a scale from disagreement over neutral to agreement, and how far from the middle its ends lie: the dark
-#: end of agreement is the darker one, so that grey print keeps the two sides apart.
+#: Colour map of a scale from disagreement over neutral to agreement, and its ends. The end of agreement is darker: the
+#: two sides stay distinct in grey print.
 _LEVELS_MAP, _LEVELS_FROM, _LEVELS_TO = "PuOr", 0.14, 0.95
 
 _STYLE: Mapping[Any, Any] = MappingProxyType(
@@ -130,7 +130,7 @@ _STYLE: Mapping[Any, Any] = MappingProxyType(
         "svg.hashsalt": "navirl",
     }
 )
-#: Settings that have the colour of the ink and of the paper.
+#: Settings with the colour of the ink and of the background.
 _COLOURED: Mapping[str, tuple[Any, ...]] = MappingProxyType(
     {
         "ink": ("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color", "patch.edgecolor"),
@@ -140,13 +140,13 @@ _COLOURED: Mapping[str, tuple[Any, ...]] = MappingProxyType(
 
 
 def look() -> Look:
-    """The look in which figures are drawn now."""
+    """The current look."""
     return _LOOK.get()
 
 
 @contextmanager
 def styled(name: str) -> Iterator[None]:
-    """Draw, open and save figures in one of LOOKS for as long as the context lasts; on paper else.
+    """Open, draw and save figures in one of LOOKS within the context. The default is paper.
 
     Args:
         name: A key of LOOKS.
@@ -160,9 +160,9 @@ def styled(name: str) -> Iterator[None]:
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Matplotlib's own defaults with the house's on top, for as long as the context or the decorated call lasts.
+    """Matplotlib's defaults with this style on top, within the context or the decorated call.
 
-    A matplotlibrc of the user does not change the figures; what was set before is set again afterwards.
+    A matplotlibrc of the user does not change the figures. Earlier settings are restored afterwards.
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -173,12 +173,12 @@ def house_style() -> Iterator[None]:
 
 
 def colour_of(key: str) -> str:
-    """The colour of a group of demonstrations or of a kind of path.
+    """The colour of a group of demonstrations or of a type of path.
 
     Args:
-        key: A group as :func:`navirl_cli.evaluation.compare.group_of` names it, or a kind of path. Force's third and
-            later cycles share a colour; other conditions' cycles, and special sets, have their condition's; whatever is
-            unknown is grey.
+        key: A group as :func:`navirl_cli.evaluation.groups.group_of` names it, or a type of path. The third and later
+            cycles of force share a colour. Cycles of other conditions, and special sets, have their condition's.
+            Unknown keys are grey.
 
     Returns:
         The colour as #RRGGBB, the same hue in every look.
@@ -190,14 +190,14 @@ def colour_of(key: str) -> str:
 
 
 def level_colours(levels: int) -> list[str]:
-    """The colours of a scale's levels from "strongly disagree" to "strongly agree".
+    """Colours of the levels of a scale from "strongly disagree" to "strongly agree".
 
     Args:
-        levels: Number of levels; an odd number has a neutral one in the middle, which is nearly white.
+        levels: Number of levels. An odd number has a neutral one in the middle, which is nearly white.
 
     Returns:
-        Colours as #RRGGBB, orange to purple, apart for every common kind of colour vision and the darker the farther
-        from the middle; up to five differ in lightness.
+        Colours as #RRGGBB, orange to purple, distinct for every common type of colour vision. They darken away from the
+        middle; up to five differ in lightness.
     """
     aside = np.linspace(-1.0, 1.0, levels)
     places = np.where(aside < 0, 0.5 + (0.5 - _LEVELS_FROM) * aside, 0.5 + (_LEVELS_TO - 0.5) * aside)
@@ -205,7 +205,7 @@ def level_colours(levels: int) -> list[str]:
 
 
 def panel_width_in(axes: Axes) -> float:
-    """The width that a panel has of its figure, labels included, inches."""
+    """Width of a panel including its labels, inches."""
     spec = axes.get_subplotspec()
     panels = 1 if spec is None else spec.get_gridspec().ncols
     return float(axes.figure.bbox.width / axes.figure.dpi / panels)

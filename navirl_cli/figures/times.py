@@ -15,24 +15,24 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
 
-#: What the figure says of itself.
+#: Note below the boxes.
 NOTE = "box: median and quartiles, whiskers: within 1.5 IQR, dots: all times"
 #: Height of the figure, inches.
 HEIGHT_IN = 2.3
-#: Greatest width of a box, in inches and in shares of the room that a modality has, which its dots fill at most.
+#: Largest width of a box, inches and as a share of a modality's width; largest share of this width for dots.
 _BOX_IN, _BOXED, _DOTTED = 0.7, 0.6, 0.9
-#: Diameter of a dot, points; from dot to dot, inches, side by side, and in shares of the axis, one above the other.
+#: Diameter of a dot, points; distance of dots side by side, inches, and one above the other, as a share of the axis.
 _DOT_PT, _BESIDE_IN, _ABOVE = 3.2, 0.055, 0.035
-#: How opaque a box is, so that its median stands out.
+#: Opacity of a box, low enough for the median to stand out.
 _OPACITY = 0.55
-#: Width of a letter below the boxes and of what stands beside them, inches.
+#: Width of a letter below the boxes, and of the axis beside them, inches.
 _LETTER_IN, _AXIS_IN = 0.055, 0.45
 _LINE: dict[str, Any] = {"color": INK, "linewidth": 0.8}
 
 
 @dataclass(frozen=True)
 class DrawnTimes:
-    """What :func:`draw_completion_times` put on the axes, by modality."""
+    """The artists of :func:`draw_completion_times`, by modality."""
 
     axes: Axes
     boxes: list[PathPatch]
@@ -45,26 +45,28 @@ class DrawnTimes:
 
 @house_style()
 def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) -> DrawnTimes:
-    """Draw completion times as box plots with every single time as a dot; dots that would hide each other part.
+    """Draw completion times as box plots, with every time as a dot. Dots that would overlap are moved sideways.
 
-    A box spans the quartiles, whiskers reach to the farthest times within 1.5 times its height (Tukey).
+    A box spans the quartiles. Whiskers reach to the farthest times within 1.5 times its height (Tukey).
 
     Args:
-        axes: Where to draw, HEIGHT_IN high or more with its labels.
-        times_s: Times by modality, s; modalities without a time are left out.
+        axes: Where to draw, at least HEIGHT_IN high with its labels.
+        times_s: Times by modality, s. Modalities without times are left out.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: There is no time, or one is not above 0.
+        DemonstrationError: No times, or one that is not above 0.
     """
     times = {modality: np.sort(np.asarray(values, dtype=float)) for modality, values in times_s.items() if len(values)}
     if not times:
-        raise DemonstrationError("no completion time to draw")
+        raise DemonstrationError("no completion times to draw")
     for modality, values in times.items():
         if not (np.isfinite(values) & (values > 0)).all():
-            raise DemonstrationError(f"completion times of {modality}: need seconds above 0, found {values.tolist()}")
+            raise DemonstrationError(
+                f"completion times of {modality}: expected seconds above 0, found {values.tolist()}"
+            )
     room_in = (panel_width_in(axes) - _AXIS_IN) / len(times)
     box, line = {"edgecolor": INK, "linewidth": 0.8}, {**_LINE, "solid_capstyle": "butt"}
     drawn = axes.boxplot(
@@ -89,7 +91,7 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
 
 
 def _dots(axes: Axes, at: int, times: FloatArray, highest: float, room_in: float) -> Line2D:
-    """All times of one modality, sorted, in the middle of it where nothing is in the way."""
+    """Draw all sorted times of one modality, in its middle where no other dot is."""
     ranks = _ranks(times, _ABOVE * highest)
     beside = min(_BESIDE_IN / room_in, _DOTTED / max(1, int(np.ptp(ranks))))
     look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 4}
@@ -98,7 +100,7 @@ def _dots(axes: Axes, at: int, times: FloatArray, highest: float, room_in: float
 
 
 def _ranks(times: FloatArray, near: float) -> FloatArray:
-    """(n,) places of sorted times to the sides of the middle: the nearest that no time closer than near has taken."""
+    """(n,) sideways places of sorted times: the nearest to the middle that no time closer than near occupies."""
     places = [0, *(side * step for step in range(1, len(times)) for side in (1, -1))]
     ranks: list[int] = []
     for number, time in enumerate(times):
@@ -108,7 +110,7 @@ def _ranks(times: FloatArray, near: float) -> FloatArray:
 
 
 def _label(axes: Axes, times: Mapping[str, FloatArray], room_in: float) -> None:
-    """Name the axes and the modalities, these with their numbers of times."""
+    """Label the axes, and the modalities with their numbers of times."""
     letters = max(1, int(room_in / _LETTER_IN))
     names = [f"{fill(modality, letters)}\n(n = {len(values)})" for modality, values in times.items()]
     axes.set_xticks(range(len(times)), names)

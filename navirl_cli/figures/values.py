@@ -25,25 +25,26 @@ from navirl_cli.figures.cells import (
 from navirl_cli.figures.style import INK, house_style
 from navirl_cli.irl.scene import Scene
 
-#: Pale at the goal; light enough everywhere for dark contour lines.
+#: Lightest at the goal; light enough everywhere for dark contour lines.
 VALUE_MAP = LinearSegmentedColormap.from_list("value", colormaps["YlGnBu_r"](np.linspace(0.35, 1.0, 256)))
-#: Most contour lines.
+#: Largest number of contour lines.
 _CONTOURS = 12
 
 
 @dataclass(frozen=True)
 class DrawnValue(DrawnCells):
-    """What :func:`draw_value` put on the axes."""
+    """The artists of :func:`draw_value`."""
 
-    #: Lines of equal value, at round numbers, which the colour bar has too.
+    #: Lines of equal value, at round numbers that the colour bar has too.
     contours: QuadContourSet
 
 
 @house_style()
 def draw_value(axes: Axes, scene: Scene, value: FloatArray, **options: Unpack[CellOptions]) -> DrawnValue:
-    """Draw the soft value of every state: the expected reward on the way to the goal, with the entropy of the moves.
+    """Draw the soft value of every state: the expected reward until the goal, with the entropy of the moves.
 
-    Colours span what is shown; lines join equal values, so that the likely moves cross them at right angles.
+    Colours span the values within the view. Contour lines connect equal values; probable moves cross them at right
+    angles.
 
     Args:
         axes: Where to draw.
@@ -55,7 +56,7 @@ def draw_value(axes: Axes, scene: Scene, value: FloatArray, **options: Unpack[Ce
         The artists.
 
     Raises:
-        ValueError: There is not one number for each state.
+        ValueError: The number of values is not the number of states.
     """
     check_states(scene, value)
     window = options.get("window_m") or scene_window(scene, scene.nominal)

@@ -22,4 +22,4 @@ FIGURES = {
 
 @click.group(cls=LazyGroup, known={name: (f"{__name__}.{file}", summary) for name, (file, summary) in FIGURES.items()})
 def plot() -> None:
-    """Draw paths, policy, reward, path properties and how a fit went."""
+    """Draw paths, policies, rewards, path properties and fits."""

@@ -1,4 +1,4 @@
-"""Figures that set rewards, or groups of demonstrations, beside each other or beside chance."""
+"""Figures that compare: rewards, groups of demonstrations, and demonstrations with the policy's own paths."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from navirl_cli.errors import DemonstrationError
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
 
-_GROUP = "A condition with cycle and set, as in the tables of evaluate, e.g. 'force, cycle 2'"
+_GROUP = "A group as in the tables of navirl evaluate, e.g. 'force, cycle 2'"
 
 
 @click.command()
@@ -27,7 +27,7 @@ _GROUP = "A condition with cycle and set, as in the tables of evaluate, e.g. 'fo
     default=1000,
     show_default=True,
     type=click.IntRange(1, 100_000),
-    help="Paths of the policy among which each demonstration ranks.",
+    help="Paths drawn from the policy, among which each demonstration ranks.",
 )
 @seed_option
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
@@ -66,9 +66,9 @@ def compare(
     their driven paths.
     """
     if min(len(rewards), len(groups)) > 0 or max(len(rewards), len(groups)) < 2:
-        raise click.UsageError("compare needs two or more --reward, or two or more --group")
+        raise click.UsageError("compare needs two or more --reward, or two or more --group.")
     if groups and trial is not None:
-        raise click.UsageError("--trial chooses the scene of --reward; groups are drawn with all their trials")
+        raise click.UsageError("--trial selects the scene of --reward; --group draws all trials of the groups.")
     demonstrations = demonstrations_in(demos)
     if groups:
         _draw_groups(page, demonstrations, groups, crop=crop)
@@ -87,7 +87,7 @@ def _draw_groups(page: Page, demonstrations: Sequence["Demonstration"], groups: 
 def _draw_rewards(
     page: Page, demonstrations: Sequence["Demonstration"], rewards: Sequence[Path], trial: str | None, *, crop: bool
 ) -> None:
-    """A row of policy and state reward for each reward, all with the same colours for the same numbers."""
+    """A row of policy and state reward for each reward; equal colours are equal values."""
     import numpy as np
 
     from navirl_cli.figures.cells import LEAST_VISITS, likely_window, scene_window
@@ -111,7 +111,7 @@ def _groups(demonstrations: Sequence["Demonstration"], names: Sequence[str]) -> 
     """The demonstrations of groups.
 
     Raises:
-        DemonstrationError: There is none of a group.
+        DemonstrationError: A group has no demonstrations.
     """
     from navirl_cli.evaluation.groups import by_group
 

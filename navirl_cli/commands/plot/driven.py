@@ -41,7 +41,9 @@ def paths(page: Page, demos: Path, crop: bool) -> None:
 @click.command()
 @page_options
 @demos_argument
-@click.option("--reward", type=FilePath, help="Learnt reward: adds bars of its paths in the scenes it was learnt from.")
+@click.option(
+    "--reward", type=FilePath, help="Learnt reward; adds bars of its paths, by the groups from which it was learnt."
+)
 @samples_option
 @seed_option
 def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed: int) -> None:
@@ -79,10 +81,10 @@ def forces(page: Page, demos: Path, trial: str | None, crop: bool) -> None:
 def _bars(
     demonstrations: list["Demonstration"], learnt: LearntReward | None, samples: int, seed: int
 ) -> list["PropertyBar"]:
-    """What was driven in every group, and in the groups that the policy was learnt from what it drives."""
+    """Bars of driven paths by group, and of learnt paths in the groups from which the reward was learnt."""
     import numpy as np
 
-    from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID, compare
+    from navirl_cli.evaluation.compare import LEARNT, compare
     from navirl_cli.evaluation.drawn import Precision
     from navirl_cli.evaluation.groups import group_of
     from navirl_cli.figures.properties import bars_of
@@ -98,7 +100,4 @@ def _bars(
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     for note in result.notes:
         say(note)
-    # Learnt paths go from cell to cell: beside them stand the driven ones along their cells.
-    return bars_of(
-        row for row in result.groups if row.kind == DRIVEN or (row.kind in {ON_GRID, LEARNT} and row.group in taught)
-    )
+    return bars_of(result.groups, taught)

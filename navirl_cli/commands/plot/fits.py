@@ -23,7 +23,7 @@ def profile(page: Page, reward: Path) -> None:
 
     learnt = read_reward(reward)
     if not learnt.profiles:
-        raise ArtefactError(f"{reward}: holds no profile; make it with navirl fit --profile sigma_p")
+        raise ArtefactError(f"{reward}: expected profile likelihoods, found none; fit again with --profile sigma_p")
     units = {parameter.name: parameter.unit for parameter in learnt.reward.parameters}
     with page.look():
         figure = draw_profiles(learnt.profiles, units, page.width_in)
@@ -40,7 +40,7 @@ def convergence(page: Page, reward: Path) -> None:
     learnt = read_reward(reward)
     search, parameters = learnt.search, learnt.reward.parameters
     if search is None:
-        raise ArtefactError(f"{reward}: holds no iterations, as files of older versions; fit anew with navirl fit")
+        raise ArtefactError(f"{reward}: expected iterations of a fit, found none; fit again with this version")
     panels, columns = 1 + len(parameters), columns_for(page.width_in)
     page.draw(
         lambda axes: draw_convergence(axes, search.log_likelihood, search.theta, parameters),

@@ -1,4 +1,4 @@
-"""Figures of one scene: where the learnt policy leads, and what it goes by."""
+"""Figures of one scene under a learnt reward: policy, reward, soft value, most likely moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from navirl_cli.irl.scene import Scene
     from navirl_cli.irl.values import Policy
 
-#: What --overlay takes.
+#: Values of --overlay.
 DEMOS, SAMPLES = "demos", "samples"
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """One scene under a learnt reward, and what is to be drawn over it."""
+    """One scene under a learnt reward, with the paths to draw over it."""
 
     demonstrations: Sequence["Demonstration"]
     one: "Demonstration"
@@ -39,14 +39,14 @@ class Sight:
 
     @cached_property
     def scene(self) -> "Scene":
-        """The chosen trial's."""
+        """The scene of the chosen trial."""
         from navirl_cli.irl.scene import scenes_of
 
         return scenes_of([self.one])[0]
 
     @cached_property
     def policy(self) -> "Policy":
-        """The learnt one."""
+        """The learnt policy."""
         from navirl_cli.irl.likelihood import policy_of
 
         return policy_of(self.reward, self.scene)
@@ -58,35 +58,30 @@ class Sight:
 
     @property
     def options(self) -> "CellOptions":
-        """What all figures of the scene share; a cropped one shows the same in all of them."""
+        """Common options of all figures of the scene; cropped figures have the same view."""
         from navirl_cli.figures.cells import likely_window
 
         overlays = self._overlays()
-        lines = [line for kind in overlays for line in kind.lines_m]
+        lines = [line for one in overlays for line in one.lines_m]
         window = likely_window(self.scene, self.visits, lines) if self.crop else None
         return {"robot_radius_m": self.one.robot_radius_m, "window_m": window, "overlays": overlays}
 
     def _overlays(self) -> list["Overlay"]:
-        """Paths to be drawn over the map, driven ones below."""
+        """Paths to draw over the map, driven ones below."""
         import numpy as np
 
-        from navirl_cli.evaluation.compare import LEARNT
-        from navirl_cli.evaluation.groups import by_group
-        from navirl_cli.figures.overlay import Overlay, alike
+        from navirl_cli.figures.overlay import alike, overlays_of
         from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 
-        overlays = []
-        if DEMOS in self.overlay:
-            groups = by_group(alike(self.demonstrations, self.one))
-            overlays += [Overlay(group, group, [one.xy_m for one in own]) for group, own in groups.items()]
+        sampled_m: list[FloatArray] = []
         if SAMPLES in self.overlay:
             paths = sample_paths(self.policy, self.scene.start, self.samples, np.random.default_rng(self.seed))
-            overlays.append(Overlay("drawn from the policy", LEARNT, sampled_lines_m(self.policy, paths)))
-        return overlays
+            sampled_m = sampled_lines_m(self.policy, paths)
+        return overlays_of(alike(self.demonstrations, self.one) if DEMOS in self.overlay else (), sampled_m)
 
 
 def scene_options(function: Function) -> Function:
-    """Options of figures of one scene, handed over as ``page`` and ``sight``."""
+    """Options of figures of one scene, as arguments ``page`` and ``sight``."""
 
     @wraps(function)
     def packed(page: Page, demos: Path, reward: Path, trial: str | None, **others: Any) -> Any:
@@ -103,10 +98,14 @@ def scene_options(function: Function) -> Function:
             "--overlay",
             multiple=True,
             type=click.Choice((DEMOS, SAMPLES)),
-            help="Draw paths over the map: demonstrated in this scene, or drawn from the policy; repeatable.",
+            help="Draw paths over the map: demonstrated in this scene, or sampled from the policy; repeatable.",
         ),
         click.option(
-            "--samples", default=20, show_default=True, type=click.IntRange(1, 1000), help="Paths of --overlay samples."
+            "--samples",
+            default=20,
+            show_default=True,
+            type=click.IntRange(1, 1000),
+            help="Paths sampled from the policy for --overlay samples.",
         ),
         seed_option,
     )

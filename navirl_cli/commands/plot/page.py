@@ -1,4 +1,4 @@
-"""What every command of ``navirl plot`` takes: where to write, how wide, for paper or for a screen."""
+"""Options that the figures of ``navirl plot`` share: file, width, style, and trial."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,20 +17,20 @@ from navirl_cli.files import check_writable
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
 
-#: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is not imported before a figure is drawn.
+#: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is imported only to draw a figure.
 STYLES = ("paper", "screen", "dark")
-#: Endings of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
+#: Extensions of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
 FORMATS = ("png", "pdf", "svg")
 
 
 class FigurePath(click.Path):
-    """The name of a figure, whose ending chooses the format."""
+    """The name of a figure's file, whose extension selects the format."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Refuse an ending that is no format."""
+        """Refuse an unknown extension."""
         path = Path(fsdecode(super().convert(value, param, ctx)))
         if path.suffix.lower().removeprefix(".") not in FORMATS:
             *others, last = (f".{extension}" for extension in FORMATS)
@@ -40,7 +40,7 @@ class FigurePath(click.Path):
 
 @dataclass(frozen=True)
 class Page:
-    """Where a figure goes and how it looks."""
+    """File and look of a figure."""
 
     output: Path
     wide: bool
@@ -49,21 +49,21 @@ class Page:
 
     @property
     def width_in(self) -> float:
-        """Width of one column or of a page of two, inches."""
+        """Width of one column, or of a page with two columns, inches."""
         from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
 
         return PAGE_IN if self.wide else COLUMN_IN
 
     @contextmanager
     def look(self) -> Iterator[None]:
-        """Draw in the style that was asked for."""
+        """Draw in the chosen style."""
         from navirl_cli.figures.style import styled
 
         with styled(self.style):
             yield
 
     def save(self, figure: Any, *, trim: bool = True) -> None:
-        """Save a figure and say where; with ``trim`` without empty height."""
+        """Save a figure and print its name; with ``trim`` without empty height."""
         from navirl_cli.figures.sheet import save_figure
 
         with self.look():
@@ -78,7 +78,7 @@ class Page:
         panels: int = 1,
         columns: int | None = None,
     ) -> None:
-        """Open a figure, draw on it, save it; one of no given height is as high as its maps need."""
+        """Open a figure, draw on its axes, save it; without a given height it is as high as its maps need."""
         from navirl_cli.figures.sheet import new_figure
 
         with self.look():
@@ -88,7 +88,7 @@ class Page:
 
 
 def page_options(function: Function) -> Function:
-    """Options of every figure, handed over as ``page``; what cannot be written is refused before any work."""
+    """Options of every figure, as argument ``page``; a file that cannot be written is refused before any work."""
 
     @wraps(function)
     def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
@@ -97,13 +97,15 @@ def page_options(function: Function) -> Function:
 
     options = (
         click.option("-o", "--output", type=FigurePath(), required=True, help="Figure to write: .png, .pdf or .svg."),
-        click.option("--wide", is_flag=True, help="As wide as a page of two columns (7.16 in), not one (3.5 in)."),
+        click.option(
+            "--wide", is_flag=True, help="Width of a page with two columns (7.16 in) instead of one column (3.5 in)."
+        ),
         click.option(
             "--style",
             type=click.Choice(STYLES),
             default="paper",
             show_default=True,
-            help="screen: twice the pixels; dark: light ink on near-black, and twice the pixels.",
+            help="paper: 300 dpi; screen: 600 dpi; dark: light ink on near-black, 600 dpi.",
         ),
         force_option,
     )
@@ -112,16 +114,16 @@ def page_options(function: Function) -> Function:
     return packed  # type: ignore[return-value]
 
 
-crop_option = click.option("--crop", is_flag=True, help="Show no more of the map than what surrounds the paths.")
-trial_option = click.option("--trial", help="Draw this trial, e.g. p01/3; the first one by default.")
+crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
+trial_option = click.option("--trial", help="Trial to draw, e.g. p01/3.  [default: the first]")
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
 
 
 def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "Demonstration":
-    """The demonstration that was asked for, or the first.
+    """The demonstration of a trial, or the first one.
 
     Raises:
-        DemonstrationError: None is called so.
+        DemonstrationError: The trial is unknown.
     """
     for one in demonstrations:
         if trial in {None, one.id}:
