@@ -24,9 +24,8 @@ extensions = [
     "mathml",
 ]
 exclude_patterns = ["_build", "_ext", "_generated/*.md", "_generated/formats", "_generated/gallery"]
-smartquotes = False  # -- begins an option
 
-myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 html_math_renderer = "mathml"
 

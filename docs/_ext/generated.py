@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -59,10 +60,10 @@ class Markdown(click.HelpFormatter):
 
 
 def escaped(text: str) -> str:
-    """Text that Markdown must not read as markup."""
+    """Text that Markdown must not read as markup, with options as code."""
     for mark in "\\*_<>[]$|#":
         text = text.replace(mark, "\\" + mark)
-    return text
+    return re.sub(r"(?<![\w-])--[a-z][a-z-]*", lambda option: f"`{option[0]}`", text)
 
 
 def help_of(command: click.Command, path: str, level: int = 2) -> str:
