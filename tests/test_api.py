@@ -160,10 +160,10 @@ class TestResults:
         navirl.evaluate("demos.json", "learnt.json").write("own.json")
         assert json.loads(Path("own.json").read_text()) == json.loads(Path("metrics.json").read_text())
         found = navirl.evaluate(demos, {"one": reward, "other": {"c0": -40.0}}, metrics="length_m", samples=10)
-        assert {row["paths"] for row in found.document["groups"]} >= {"learnt, one", "learnt, other"}
+        assert {row["path_type"] for row in found.document["groups"]} >= {"learnt, one", "learnt, other"}
         assert "learnt, other" in repr(found)
         found.write("metrics.csv")
-        assert Path("metrics.csv").read_text().startswith("group,paths,n,length_m")
+        assert Path("metrics.csv").read_text().startswith("group,path_type,n,length_m")
 
     def test_a_policy_lies_on_its_grid(self, demos, reward):
         where = navirl.policy(reward, demos[0])
@@ -191,7 +191,7 @@ class TestFrames:
         assert list(reward.to_frame()["name"]) == ["c0", "a_g", "a_p", "sigma_p"]
         found = navirl.evaluate(demos, reward, pair=("force, cycle 2", "joystick"), ranks=True, samples=20)
         groups = found.to_frame()
-        assert groups.loc[groups["paths"] == "driven", "length_m_mean"].notna().all()
+        assert groups.loc[groups["path_type"] == "driven", "length_m_mean"].notna().all()
         assert len(found.to_frame("demonstrations")) == len(demos)
         assert list(found.to_frame("pairs")["metric"]) == ["length_m", "min_distance_m", "area_m2"]
         assert found.to_frame("ranks")["rank"].between(0, 1).all()

@@ -323,7 +323,7 @@ def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
     assert Path("metrics.csv").read_text() == navirl(*words, "--format", "csv").stdout
     assert len(rows) == len(document["groups"]) == 4 * 5
     for row, group in zip(rows, document["groups"], strict=True):
-        assert (row["group"], row["paths"], int(row["n"])) == (group["group"], group["paths"], group["count"])
+        assert (row["group"], row["path_type"], int(row["n"])) == (group["group"], group["path_type"], group["count"])
         assert float(row["length_m_mean"]) == pytest.approx(group["mean"]["length_m"], rel=1e-5)
         assert f"{group['mean']['area_m2']:.3f}" in table
     assert [d["id"] for d in document["demonstrations"]] == [f"p01/{n}" for n in range(1, 8)]
@@ -338,7 +338,7 @@ def test_evaluate_knows_one_seed_from_another(navirl, work):
 def test_evaluate_without_a_reward_measures_no_learnt_paths(navirl, work):
     document = json.loads(navirl("evaluate", work / "demos.json", "--json").stdout)
     assert document["samples"] == 0
-    assert {group["paths"] for group in document["groups"]} == {"driven", "driven, on grid", "nominal", "avoidance"}
+    assert {group["path_type"] for group in document["groups"]} == {"driven", "driven, on grid", "nominal", "avoidance"}
     message = navirl("evaluate", work / "demos.json", "-o", "m.txt", code=1).stderr
     assert "m.txt: expected a name that ends in one of .json, .csv, .md, .tex, found '.txt'" in message
 

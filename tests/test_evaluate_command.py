@@ -127,12 +127,12 @@ def test_pairs_are_compared_by_participant(navirl, work):
     found = pair["metrics"]["length_m"]
     assert found["by_participant"] == pytest.approx(expected)
     values = np.array(list(expected.values()))
-    assert found["student_interval"] == pytest.approx(stats.t.interval(0.95, 2, values.mean(), stats.sem(values)))
-    assert (found["n"], found["bootstrap_interval"]) == (3, None)
+    low, high = found["student_lower"], found["student_upper"]
+    assert (low, high) == pytest.approx(stats.t.interval(0.95, 2, values.mean(), stats.sem(values)))
+    assert (found["n"], found["bootstrap_lower"]) == (3, None)
     assert found["wilcoxon_p"] == pytest.approx(stats.wilcoxon(values).pvalue)
     text = navirl(*words).stdout
     assert "joystick - force, cycle 2, driven paths, paired by participant" in text
-    low, high = found["student_interval"]
     cells = [f"{found['mean_difference']:+.3f}", f"{low:+.3f} to {high:+.3f}", "-", "3", f"{found['wilcoxon_p']:.4f}"]
     table = text[text.index("joystick - force, cycle 2") :].splitlines()
     assert re.split(" {2,}", next(line for line in table if line.startswith("path length m")))[1:6] == cells

@@ -360,7 +360,7 @@ def test_plot_profile_draws_what_the_file_holds(navirl, files):
 
 def test_plot_profile_without_a_profile_is_refused(navirl, files, tmp_path):
     message = navirl("plot", "profile", files / "reward.json", "-o", "a.png", code=1).stderr
-    assert message.endswith("reward.json: holds no profile; make it with navirl fit --profile sigma_p\n")
+    assert message.endswith("reward.json: expected profile likelihoods, found none; fit again with --profile sigma_p\n")
     assert "ends in .png, .pdf or .svg" in navirl("plot", "profile", files / "full.json", "-o", "a.gif", code=2).stderr
     assert list(tmp_path.iterdir()) == []
 

@@ -320,7 +320,7 @@ def evaluate(
         NavirlError: A metric or a group is unknown, or a reward has no policy in a scene.
 
     Example:
-        >>> navirl.evaluate(demos, reward).to_frame()[["group", "paths", "length_m_mean"]]
+        >>> navirl.evaluate(demos, reward).to_frame()[["group", "path_type", "length_m_mean"]]
     """
     demos = demonstrations_in(demos)
     rewards = _rewards(reward, demos)

@@ -103,8 +103,8 @@ def _pair(one: Paired) -> dict[str, Any]:
     """One comparison of two groups."""
     return {
         "mean_difference": one.mean,
-        "student_interval": _interval(one.student),
-        "bootstrap_interval": _interval(one.bootstrap),
+        **_interval("student", one.student),
+        **_interval("bootstrap", one.bootstrap),
         "n": one.n,
         "wilcoxon_p": number(one.wilcoxon_p),
         "cohen_dz": number(one.cohen_dz),
@@ -113,11 +113,10 @@ def _pair(one: Paired) -> dict[str, Any]:
     }
 
 
-def _interval(interval: Interval | None) -> list[float] | None:
+def _interval(name: str, interval: Interval | None) -> dict[str, float | None]:
     """Lower and upper end; null for an interval that does not exist."""
-    if interval is None or number(interval.lower) is None:
-        return None
-    return [interval.lower, interval.upper]
+    ends = interval or (float("nan"), float("nan"))
+    return {f"{name}_{end}": number(value) for end, value in zip(("lower", "upper"), ends, strict=True)}
 
 
 def _ranks(ranks: Sequence[Rank]) -> dict[str, Any]:
