@@ -11,6 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
+from matplotlib.ticker import AutoLocator, FixedLocator
+from matplotlib.transforms import BboxBase
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, house_style, look
@@ -114,25 +116,47 @@ def trim_height(figure: Figure) -> None:
     Args:
         figure: Changed in place. Panels that fill their height keep it.
     """
+    _lay_out(figure, trim=True)
+
+
+def _lay_out(figure: Figure, *, trim: bool) -> None:
+    """Lay out until nothing is clipped at the sides and, with ``trim``, no height is empty."""
     layout = figure.get_layout_engine()
     for _ in range(_MOST_TRIMS):
         if layout is not None:
             layout.execute(figure)
+        extents = _extents(figure)
         width, height = map(float, figure.get_size_inches())
-        empty = height - _filled_in(figure)
-        if empty <= SLACK_IN:
+        empty = height - _filled_in(figure, extents) if trim else 0.0
+        clipped = any(one.x0 < 0 or one.x1 > figure.bbox.width for one in extents)
+        if empty <= SLACK_IN and not clipped:
             return
-        figure.set_size_inches(width, height - empty + SLACK_IN / 2)
+        if clipped:
+            _fix_ticks(figure)
+        if empty > SLACK_IN:
+            figure.set_size_inches(width, height - empty + SLACK_IN / 2)
 
 
-def _filled_in(figure: Figure) -> float:
-    """Height of panels and legends with the border around each row, inches."""
+def _fix_ticks(figure: Figure) -> None:
+    """Keep the present ticks: a layout may give axes a size with longer ticks than those it made room for."""
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if isinstance(axis.get_major_locator(), AutoLocator):
+            axis.set_major_locator(FixedLocator(list(axis.get_majorticklocs())))
+
+
+def _extents(figure: Figure) -> list[BboxBase]:
+    """Boxes of panels, legends and texts, pixels."""
     # a legend in a free place is smaller than its hidden axes
     panels = (axes if axes.axison else axes.get_legend() for axes in figure.axes)
-    extents = [part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None]
+    extents = (part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None)
+    return [extent for extent in extents if extent is not None]
+
+
+def _filled_in(figure: Figure, extents: Sequence[BboxBase]) -> float:
+    """Height of panels and legends with the border around each row, inches."""
     touching = 2 * PAD_IN * figure.dpi  # rows may be that near before the layout is final
     rows: list[list[float]] = []
-    for y0, y1 in sorted((extent.y0, extent.y1) for extent in extents if extent is not None):
+    for y0, y1 in sorted((extent.y0, extent.y1) for extent in extents):
         if rows and y0 < rows[-1][1] - touching:
             rows[-1][1] = max(rows[-1][1], y1)
         else:
@@ -142,16 +166,15 @@ def _filled_in(figure: Figure) -> float:
 
 @house_style()
 def settle(figure: Figure, *, trim: bool = True) -> None:
-    """Fix the layout: a figure that is saved in several formats is laid out once.
+    """Lay out a figure for its resolution in the current look, and fix this layout for all formats.
 
     Args:
         figure: Changed in place.
-        trim: Remove empty height first, as :func:`trim_height`.
+        trim: Remove empty height, as :func:`trim_height`.
     """
-    if trim:
-        trim_height(figure)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    figure.set_dpi(look().dpi)
+    _lay_out(figure, trim=trim)
+    figure.set_layout_engine(None)
 
 
 def check_target(path: Path, *, force: bool = False) -> str:
@@ -181,20 +204,21 @@ def check_target(path: Path, *, force: bool = False) -> str:
 def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool = True) -> None:
     """Save a figure in the format of its file's extension: the same figure gives the same bytes.
 
-    The file appears completely or not at all.
+    The figure is laid out first, as by :func:`settle`, unless it has a fixed layout. The file appears completely or not
+    at all.
 
     Args:
         figure: The figure.
         path: A .png, .pdf or .svg file.
         force: Replace an existing file.
-        trim: Remove empty height first, as :func:`trim_height`.
+        trim: Remove empty height, as :func:`trim_height`.
 
     Raises:
         ArtefactError: As in :func:`check_target`, or writing fails.
     """
     extension = check_target(path, force=force)
-    if trim:
-        trim_height(figure)
+    if figure.get_layout_engine() is not None:
+        settle(figure, trim=trim)
     page = BytesIO()
     figure.canvas.print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
     with replacing(path, force=force) as part:
