@@ -10,7 +10,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 from navirl_cli.figures.cells import DrawnCells
-from navirl_cli.figures.style import DPI
+from navirl_cli.figures.sheet import settle
+from navirl_cli.figures.style import house_style
 from navirl_cli.irl.scene import Scene
 
 #: Linear RGB as people with colour blindness see it (Machado, Oliveira and Fernandes 2009, severity 1).
@@ -54,9 +55,10 @@ def drawn_texts():
 
 
 def assert_no_overlap(figure):
-    """No texts overlap, and none is clipped."""
-    figure.set_dpi(DPI)
-    with drawn_texts() as boxes:
+    """No texts of a figure overlap, and none is clipped, with the layout in which it is saved."""
+    if figure.get_layout_engine() is not None:
+        settle(figure, trim=False)
+    with house_style(), drawn_texts() as boxes:
         figure.draw_without_rendering()
     drawn = [(text.get_text(), box) for text, box in boxes.items()]
     assert len(drawn) > 3

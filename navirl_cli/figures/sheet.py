@@ -6,14 +6,15 @@ from math import ceil
 from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.ticker import AutoLocator, FixedLocator
-from matplotlib.transforms import BboxBase
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, house_style, look
 from navirl_cli.files import check_writable, replacing
@@ -23,9 +24,10 @@ from navirl_cli.files import check_writable, replacing
 METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
     {"png": {}, "pdf": {"CreationDate": None, "ModDate": None}, "svg": {"Date": None}}
 )
-#: White border around everything, and empty height that is tolerated, inches.
+#: White border around everything; empty height, and movement of a panel by another layout, that are tolerated, inches.
 PAD_IN, SLACK_IN = 0.03, 0.02
-_MOST_TRIMS = 10
+#: Largest number of layouts, and the number after which ticks are kept.
+_MOST_LAYOUTS, _FREE_LAYOUTS = 10, 4
 
 
 @house_style()
@@ -60,7 +62,8 @@ def new_figure(
     else:
         figure = Figure(figsize=(width_in, height_in), layout=layout)
     grid = figure.add_gridspec(rows, columns)
-    return figure, [figure.add_subplot(grid[divmod(panel, columns)]) for panel in range(panels)]
+    # Maps keep to the top of the room that they do not fill: taking it away then moves none of them.
+    return figure, [figure.add_subplot(grid[divmod(panel, columns)], anchor="N") for panel in range(panels)]
 
 
 def outer_labels(axes: Sequence[Axes]) -> None:
@@ -120,48 +123,62 @@ def trim_height(figure: Figure) -> None:
 
 
 def _lay_out(figure: Figure, *, trim: bool) -> None:
-    """Lay out until nothing is clipped at the sides and, with ``trim``, no height is empty."""
-    layout = figure.get_layout_engine()
-    for _ in range(_MOST_TRIMS):
+    """Lay out until no panel moves any more, nothing is clipped and, with ``trim``, no height is empty."""
+    layout, at = figure.get_layout_engine(), _places_in(figure)
+    for number in range(_MOST_LAYOUTS):
+        if number == _FREE_LAYOUTS:
+            _fix_ticks(figure)
         if layout is not None:
             layout.execute(figure)
-        extents = _extents(figure)
+        before, at, boxes = at, _places_in(figure), _boxes_in(figure)
         width, height = map(float, figure.get_size_inches())
-        empty = height - _filled_in(figure, extents) if trim else 0.0
-        clipped = any(one.x0 < 0 or one.x1 > figure.bbox.width for one in extents)
-        if empty <= SLACK_IN and not clipped:
-            return
-        if clipped:
-            _fix_ticks(figure)
+        empty = height - _filled_in(boxes) if trim else 0.0
         if empty > SLACK_IN:
             figure.set_size_inches(width, height - empty + SLACK_IN / 2)
+        elif np.abs(at - before).max(initial=0.0) < SLACK_IN and _inside(boxes, width, height):
+            return
+
+
+def _places_in(figure: Figure) -> FloatArray:
+    """(n, 4) borders of panels, from the left and from the top, inches."""
+    boxes = [axes.get_position() for axes in figure.axes]
+    borders = np.array([(box.x0, box.x1, 1 - box.y0, 1 - box.y1) for box in boxes]).reshape(-1, 4)
+    width, height = figure.get_size_inches()
+    places: FloatArray = borders * (width, width, height, height)
+    return places
 
 
 def _fix_ticks(figure: Figure) -> None:
-    """Keep the present ticks: a layout may give axes a size with longer ticks than those it made room for."""
+    """Keep the present ticks: ticks that depend on the size of a panel can keep its layout from settling."""
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         if isinstance(axis.get_major_locator(), AutoLocator):
             axis.set_major_locator(FixedLocator(list(axis.get_majorticklocs())))
 
 
-def _extents(figure: Figure) -> list[BboxBase]:
-    """Boxes of panels, legends and texts, pixels."""
+def _boxes_in(figure: Figure) -> FloatArray:
+    """(n, 4) borders x0, y0, x1, y1 of panels with their labels, of legends and of texts, inches."""
     # a legend in a free place is smaller than its hidden axes
     panels = (axes if axes.axison else axes.get_legend() for axes in figure.axes)
     extents = (part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None)
-    return [extent for extent in extents if extent is not None]
+    boxes: FloatArray = np.array([extent.extents for extent in extents if extent is not None]).reshape(-1, 4)
+    return boxes / figure.dpi
 
 
-def _filled_in(figure: Figure, extents: Sequence[BboxBase]) -> float:
-    """Height of panels and legends with the border around each row, inches."""
-    touching = 2 * PAD_IN * figure.dpi  # rows may be that near before the layout is final
+def _inside(boxes: FloatArray, width: float, height: float) -> bool:
+    """Whether (n, 4) boxes are within a figure, inches."""
+    return bool((boxes[:, :2] >= 0).all() and (boxes[:, 2:] <= (width, height)).all())
+
+
+def _filled_in(boxes: FloatArray) -> float:
+    """Height of rows of (n, 4) boxes with the border around each row, inches."""
+    touching = 2 * PAD_IN  # rows may be that near before the layout is final
     rows: list[list[float]] = []
-    for y0, y1 in sorted((extent.y0, extent.y1) for extent in extents):
+    for y0, y1 in sorted(boxes[:, [1, 3]].tolist()):
         if rows and y0 < rows[-1][1] - touching:
             rows[-1][1] = max(rows[-1][1], y1)
         else:
             rows.append([y0, y1])
-    return sum((y1 - y0) / figure.dpi + 2 * PAD_IN for y0, y1 in rows)
+    return sum(y1 - y0 + 2 * PAD_IN for y0, y1 in rows)
 
 
 @house_style()
