@@ -1,5 +1,6 @@
 """Checks of a drawn figure: its texts, its cells, its colours."""
 
+from contextlib import contextmanager
 from itertools import combinations
 from unittest.mock import patch
 
@@ -9,7 +10,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 from navirl_cli.figures.cells import DrawnCells
-from navirl_cli.figures.style import DPI
+from navirl_cli.figures.sheet import settle
+from navirl_cli.figures.style import house_style
 from navirl_cli.irl.scene import Scene
 
 #: Linear RGB as people with colour blindness see it (Machado, Oliveira and Fernandes 2009, severity 1).
@@ -37,8 +39,9 @@ def labelled(axes, label):
     return line
 
 
-def drawn_texts(figure):
-    """Every text that is drawn, with its box."""
+@contextmanager
+def drawn_texts():
+    """Every text that is drawn within the context, with its box when it was drawn last."""
     drawn = {}
     draw = Text.draw
 
@@ -48,14 +51,16 @@ def drawn_texts(figure):
             drawn[text] = text.get_window_extent()
 
     with patch.object(Text, "draw", note):
-        figure.draw_without_rendering()
-    return drawn
+        yield drawn
 
 
 def assert_no_overlap(figure):
-    """No texts overlap, and none is clipped."""
-    figure.set_dpi(DPI)
-    drawn = [(text.get_text(), box) for text, box in drawn_texts(figure).items()]
+    """No texts of a figure overlap, and none is clipped, with the layout in which it is saved."""
+    if figure.get_layout_engine() is not None:
+        settle(figure, trim=False)
+    with house_style(), drawn_texts() as boxes:
+        figure.draw_without_rendering()
+    drawn = [(text.get_text(), box) for text, box in boxes.items()]
     assert len(drawn) > 3
     paper = figure.bbox
     assert [text for text, box in drawn if box.x0 < 0 or box.x1 > paper.x1 or box.y0 < 0 or box.y1 > paper.y1] == []

@@ -7,7 +7,7 @@ from figure_factory import PUBLISHED, one_axes, scene, scene_and_visits
 from matplotlib.colors import to_rgba
 
 from navirl_cli.figures.cells import LEAST_VISITS, REACH_M, draw_policy, draw_reward
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure, settle
 from navirl_cli.figures.style import COLUMN_IN, DPI, PAGE_IN
 
 #: A window so flat that its colour bar stands above it.
@@ -131,7 +131,7 @@ def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(valu
 def test_the_label_of_a_colour_bar_is_no_longer_than_the_bar(width_in, window):
     drawn = draw_reward(one_axes(width_in), scene(), PUBLISHED.by_cell(scene()), window_m=window)
     drawn.axes.figure.set_dpi(DPI)
-    trim_height(drawn.axes.figure)
+    settle(drawn.axes.figure)
     beside = drawn.colour_bar.orientation == "vertical"
     axis = drawn.colour_bar.ax.yaxis if beside else drawn.colour_bar.ax.xaxis
     of_label, of_map = axis.label.get_window_extent(), drawn.axes.get_window_extent()

@@ -8,7 +8,7 @@ from matplotlib.colors import to_hex
 
 from navirl_cli.demos.grid import MOVES
 from navirl_cli.figures.actions import draw_actions
-from navirl_cli.figures.sheet import trim_height
+from navirl_cli.figures.sheet import settle
 from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 from navirl_cli.irl.likelihood import policy_of
@@ -87,7 +87,7 @@ def test_arrows_point_to_the_most_likely_move_and_are_as_long_as_it_is_probable(
 @pytest.mark.parametrize(("width_in", "every"), [(COLUMN_IN, 3), (PAGE_IN, 2)])
 def test_small_cells_have_fewer_arrows(width_in, every):
     drawn = draw_actions(one_axes(width_in), SCENE, POLICY.probability)
-    trim_height(drawn.axes.figure)
+    settle(drawn.axes.figure)
     cells = SCENE.lattice.cells[drawn.states]
     assert {int(gap) for column in range(2) for gap in np.diff(np.unique(cells[:, column]))} == {every}
     expected = ((SCENE.lattice.cells - SCENE.lattice.cells[SCENE.start]) % every == 0).all(axis=1)

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 from navirl_cli.demos.demonstration import Condition, Contact
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure, settle
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 
 
@@ -101,7 +101,7 @@ def test_contacts_are_shaded_from_start_to_end_and_named_above_the_curves():
 )
 def test_no_texts_overlap_with_contacts_near_each_other_and_both_panels_are_equally_wide(width_in, spans):
     figure, drawn = drawn_of(pushed(spans), width_in)
-    trim_height(figure)
+    settle(figure)
     assert_no_overlap(figure)
     widths = [part.get_window_extent().width for part in (drawn.map.axes, drawn.over_time)]
     assert widths[0] == pytest.approx(widths[1], rel=0.02)

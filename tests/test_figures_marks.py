@@ -16,7 +16,7 @@ from navirl_cli.figures.overlay import Overlay, alike
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.scale import length_m
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure, settle
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.solved import SolvedScene
 
@@ -33,7 +33,7 @@ def test_a_scale_bar_is_one_metre_or_a_round_number_that_fits(width_m, expected)
 def test_the_scale_bar_is_to_scale_and_labelled_and_hides_no_path(width_in):
     one = demonstration(aside_m=-1.2)
     drawn = draw_paths(one_axes(width_in), [one])
-    trim_height(drawn.axes.figure)
+    settle(drawn.axes.figure)
     bar = drawn.marks.scale_bar
     (x0, y0), (x1, y1) = bar.get_xydata()
     assert (x1 - x0, y1 - y0) == pytest.approx((1.0, 0.0))
@@ -174,7 +174,7 @@ def test_paths_over_values_are_thin_and_have_the_colour_of_their_group(draw):
 def test_no_texts_overlap_on_a_map_with_everything():
     a_scene, visits = scene_and_visits()
     drawn = draw_policy(one_axes(), a_scene, visits, overlays=overlays(), robot_radius_m=0.3, title="policy")
-    trim_height(drawn.axes.figure)
+    settle(drawn.axes.figure)
     assert_no_overlap(drawn.axes.figure)
 
 

@@ -8,7 +8,7 @@ from scipy.stats import kstest
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ranks import draw_ranks
-from navirl_cli.figures.sheet import trim_height
+from navirl_cli.figures.sheet import settle
 from navirl_cli.figures.style import COLUMN_IN
 
 RANKS = np.array([0.7, 0.1, 0.4, 0.45])
@@ -54,7 +54,7 @@ def test_the_title_gives_number_and_p_value():
 def test_no_texts_overlap():
     axes = one_axes(COLUMN_IN)
     draw_ranks(axes, RANKS, 0.5)
-    trim_height(axes.figure)
+    settle(axes.figure)
     assert_no_overlap(axes.figure)
 
 

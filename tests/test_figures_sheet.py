@@ -9,12 +9,16 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from figure_checks import drawn_texts
+from figure_factory import demonstration, one_axes
 from matplotlib.figure import Figure
 
 import navirl_cli.figures
+from navirl_cli.demos.demonstration import Condition
 from navirl_cli.errors import ArtefactError
+from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.sheet import check_target, new_figure, save_figure
-from navirl_cli.figures.style import COLUMN_IN, house_style
+from navirl_cli.figures.style import COLUMN_IN, LOOKS, house_style, styled
 
 MODULES = sorted(path.stem for path in Path(navirl_cli.figures.__file__).parent.glob("*.py") if path.stem != "__init__")
 
@@ -141,6 +145,25 @@ def test_trimming_can_be_declined(tmp_path):
     before = tuple(made.get_size_inches())
     save_figure(made, tmp_path / "a.png", trim=False)
     assert tuple(made.get_size_inches()) == before
+
+
+@pytest.mark.parametrize(("low_m", "high_m"), [(-1.6, 1.73), (-1.56, 1.74)])
+def test_no_label_is_clipped_where_the_size_of_the_map_changes_its_ticks(tmp_path, low_m, high_m):
+    ones = [demonstration(cycle=1), demonstration(Condition.JOYSTICK, 3)]
+    with styled("dark"), drawn_texts() as boxes:
+        axes = draw_paths(one_axes(), ones, window_m=(-3.65, 3.65, low_m, high_m)).axes
+        save_figure(axes.figure, tmp_path / "a.png")
+    assert min(box.x0 for box in boxes.values()) >= 0
+    assert max(box.x1 for box in boxes.values()) <= COLUMN_IN * LOOKS["dark"].dpi
+
+
+def test_a_saved_figure_keeps_its_layout_in_every_format(tmp_path):
+    made, (axes,) = new_figure(COLUMN_IN)
+    axes.imshow(np.zeros((10, 50)))
+    save_figure(made, tmp_path / "a.png")
+    before = axes.get_position().bounds, tuple(made.get_size_inches())
+    save_figure(made, tmp_path / "a.pdf")
+    assert (axes.get_position().bounds, tuple(made.get_size_inches())) == before
 
 
 def test_no_setting_of_the_process_changes(tmp_path):

@@ -16,7 +16,7 @@ from navirl_cli.figures import times
 from navirl_cli.figures.cells import LEAST_VISITS, draw_reward
 from navirl_cli.figures.conditions import draw_path_panels
 from navirl_cli.figures.policies import draw_policy_and_reward
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure, settle
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.solved import SolvedScene
@@ -162,7 +162,7 @@ def test_all_panels_show_what_the_widest_needs():
 def test_panels_are_of_one_size_and_no_texts_overlap(count, columns, width_in):
     panels = [(f"{title} with the participants' hands", members) for title, members in PANELS[:count]]
     figure, drawn = conditions(panels, columns, width_in)
-    trim_height(figure)
+    settle(figure)
     assert_no_overlap(figure)
     boxes = [panel.axes.get_window_extent() for panel in drawn.panels]
     assert np.ptp([box.width for box in boxes]) < 1.0
@@ -279,7 +279,7 @@ def test_no_texts_in_rows_of_policies_overlap(count, width_in):
         for title, one in scenes()[:count]
     ]
     figure, drawn = policies(entries, width_in)
-    trim_height(figure)
+    settle(figure)
     assert_no_overlap(figure)
     boxes = [one.axes.get_window_extent() for one in (*drawn.policies, *drawn.rewards)]
     assert np.ptp([box.width for box in boxes]) < 1.0

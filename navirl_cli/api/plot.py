@@ -343,10 +343,10 @@ def _drawn(
             return axes
         figure, axes = new_figure(_width_in(page), height_in, panels, columns, managed=output is None)
         draw(axes)
-        if height_in is None:
-            trim_height(figure)
         if output is not None:
-            save_figure(figure, Path(output), force=page.get("force", False), trim=False)
+            save_figure(figure, Path(output), force=page.get("force", False), trim=height_in is None)
+        elif height_in is None:
+            trim_height(figure)
     return axes
 
 
