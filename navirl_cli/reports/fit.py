@@ -147,7 +147,7 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
     lost += [f"{found['stopped_early']} stopped early"] if found["stopped_early"] else []
     lost += [
         f"{one['name']} identified in {identified} of them"
-        for one, identified in zip(content["parameters"], found["told"], strict=True)
+        for one, identified in zip(content["parameters"], found["identified_draws"], strict=True)
         if identified < count
     ]
     return [Paragraph(", ".join([f"Bootstrap: {count} draws of participants (seed {found['seed']})", *lost]) + ".")]
@@ -186,7 +186,8 @@ def validation_tables(content: Mapping[str, Any]) -> list[Block]:
         return []
     names, steps, features = found["left_out"], found["steps"], found["features"]
     likelihoods = tuple(
-        (model, one["per_step"], *_per_step(one["log_likelihood"], steps)) for model, one in found["models"].items()
+        (model, one["log_likelihood_per_step"], *_per_step(one["log_likelihood"], steps))
+        for model, one in found["models"].items()
     )
     mismatches = tuple(
         (name, _root_mean_square(one["mismatch_standard_errors"], one["identified"]), *one["mismatch_standard_errors"])
