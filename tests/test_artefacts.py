@@ -138,7 +138,7 @@ def extract_coarse(demonstration):
         (lambda d: d["demonstrations"][0]["cells"].__setitem__(3, [10**30, 1]), "demonstration run/1: .*too large"),
         (lambda d: d["demonstrations"][0].update(robot_radius_m=float("nan")), "found none .NaN is no JSON number"),
         (lambda d: d.pop("maps"), "at the whole file: expected the field 'maps', which is missing"),
-        (lambda d: d.update(version=0), "at version: expected 2, found 0"),
+        (lambda d: d.update(version=0), "version: expected 1 to 2, found 0; later"),
         (lambda d: d.update(extra=1), "at the whole file: expected no field 'extra', which the format"),
         (
             lambda d: d["demonstrations"][0].update(condition="push"),

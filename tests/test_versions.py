@@ -1,6 +1,7 @@
 """Files of navirl 0.1.0 (version 1) are read as those of today; tests/version1 holds small ones that it wrote."""
 
 import json
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ KINDS = ("demonstrations", "reward", "metrics", "study")
 RENAMED = {
     "demonstrations": ("peak_n", "impulse_ns", "m_s_per_n", "standard_error"),
     "reward": ("told", "per_step"),
-    "metrics": (),
+    "metrics": ("less", "lower", "p_value"),
     "study": (),
 }
 
@@ -30,10 +31,10 @@ def keys(value):
             yield from keys(one)
 
 
-def numbers(value):
+def values(value):
     if isinstance(value, dict | list):
         for one in value.values() if isinstance(value, dict) else value:
-            yield from numbers(one)
+            yield from values(one)
     else:
         yield value
 
@@ -45,9 +46,9 @@ def test_files_of_version_1_are_read(kind):
     found = read_json(OLD / f"{kind}.json", kind)
     assert found.pop("version") == 2
     written.pop("version")
-    assert sorted(map(str, numbers(found))) == sorted(map(str, numbers(written)))
+    assert not Counter(map(str, values(written))) - Counter(map(str, values(found))), "nothing is lost"
     assert set(RENAMED[kind]) <= set(keys(written))
-    assert not set(RENAMED[kind]) & set(keys(found)) - {"standard_error"}
+    assert not set(RENAMED[kind]) & set(keys(found)) - {"standard_error", "p_value"}
 
 
 def test_what_was_renamed_means_the_same():
@@ -62,6 +63,12 @@ def test_what_was_renamed_means_the_same():
     assert reward["bootstrap"]["identified_draws"] == [3, 2, 3, 3]
     models = reward["cross_validation"]["models"]
     assert models["uniform"]["log_likelihood_per_step"] == pytest.approx(-2.0794, abs=1e-4)
+    metrics = read_json(OLD / "metrics.json", "metrics")
+    assert metrics["metrics"] == ["length_m", "min_distance_m", "area_m2"]
+    assert [one["participant"] for one in metrics["demonstrations"]] == ["a", "a", "b", "b"]
+    assert {one["path_type"] for one in metrics["groups"]} >= {"driven", "learnt"}
+    (pair,) = metrics["pairs"]
+    assert (pair["minus"], pair["metrics"]["length_m"]["student_lower"]) == ("force, cycle 2", None)
     assert [one.name for one in read_reward(OLD / "reward.json").profiles] == ["sigma_p"]
 
 
@@ -93,11 +100,15 @@ def test_what_is_written_is_of_version_2_and_comes_back(kind, tmp_path):
         ("reward", lambda d: d.update(bootstrap="told"), "at bootstrap: expected an object or null, found 'told'"),
         ("reward", lambda d: d["bootstrap"].update(told=True), "at bootstrap/identified_draws: expected a list, found"),
         ("reward", lambda d: d["cross_validation"].update(models=[{"per_step": 1}]), "at cross_validation/models: exp"),
-        ("metrics", lambda d: d.update(version=True), "at version: expected 2, found True"),
-        ("metrics", lambda d: d.update(version=0), "at version: expected 2, found 0"),
-        ("metrics", lambda d: d.update(version="1"), "at version: expected 2, found '1'"),
-        ("metrics", lambda d: d.pop("version"), "at the whole file: expected the field 'version', which is missing"),
-        ("metrics", lambda d: d.update(version=3), "version: expected at most 2, found 3; update navirl to read it"),
+        ("metrics", lambda d: d.update(groups=[[1]]), "at groups/0: expected an object, found a list"),
+        ("metrics", lambda d: d["groups"][0].update(mean=5), "at groups/0/mean: expected an object, found 5"),
+        ("metrics", lambda d: d.update(demonstrations={"a": {"id": [1]}}), "at demonstrations: expected a list, found"),
+        ("metrics", lambda d: d.update(version=True), "version: expected 1 to 2, found True"),
+        ("metrics", lambda d: d.update(version=0), "version: expected 1 to 2, found 0"),
+        ("metrics", lambda d: d.update(version="1"), "version: expected 1 to 2, found '1'"),
+        ("metrics", lambda d: d.update(version=[[1]]), "version: expected 1 to 2, found a list of 1 items"),
+        ("metrics", lambda d: d.pop("version"), "version: expected 1 to 2, found None; later ones need a later navirl"),
+        ("metrics", lambda d: d.update(version=3), "version: expected 1 to 2, found 3; later ones need a later navirl"),
     ],
 )
 def test_broken_files_of_version_1_are_refused_with_the_place(tmp_path, kind, change, message):

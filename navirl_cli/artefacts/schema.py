@@ -30,6 +30,13 @@ class Problem:
         return f"{'/'.join(map(str, self.place)) or 'the whole file'}: {self.text}"
 
 
+def shown(value: object) -> str:
+    """A value as a message shows it; what is nested is only counted."""
+    if isinstance(value, list):
+        return f"a list of {len(value)} items"
+    return f"an object of {len(value)} fields" if isinstance(value, dict) else brief(value)
+
+
 def first_problem(document: object, schema: Schema) -> Problem | None:
     """The first place at which a document does not fit a schema.
 
@@ -51,7 +58,7 @@ def _problems(value: Any, schema: Schema, root: Schema, place: Place) -> Iterato
         if keyword in _PLAIN:
             applies, fits, expected = _PLAIN[keyword]
             if isinstance(value, applies) and not fits(value, wanted):
-                yield Problem(place, f"expected {expected(wanted)}, found {_shown(value)}")
+                yield Problem(place, f"expected {expected(wanted)}, found {shown(value)}")
         elif keyword in _NESTED:
             yield from _NESTED[keyword](value, schema, root, place)
         else:
@@ -86,13 +93,6 @@ def _names(wanted: str | list[str]) -> list[str]:
 def _is_one_of(value: object, wanted: list[object]) -> bool:
     """Whether a value is in a list; 1 is not true."""
     return any(value == one and isinstance(value, bool) == isinstance(one, bool) for one in wanted)
-
-
-def _shown(value: object) -> str:
-    """A value as a message shows it; what is nested is only counted."""
-    if isinstance(value, list):
-        return f"a list of {len(value)} items"
-    return f"an object of {len(value)} fields" if isinstance(value, dict) else brief(value)
 
 
 _NUMBER = (int, float)
@@ -163,7 +163,7 @@ def _one_of(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[
     """Exactly one of several; where none fits, what the last one expects."""
     found = [next(_problems(value, one, root, place), None) for one in schema["oneOf"]]
     if found.count(None) > 1:
-        yield Problem(place, f"expected what only one of {len(found)} choices allows, found {_shown(value)}")
+        yield Problem(place, f"expected what only one of {len(found)} choices allows, found {shown(value)}")
     elif None not in found and found[-1] is not None:
         yield found[-1]
 

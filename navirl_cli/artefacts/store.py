@@ -12,8 +12,8 @@ import numpy as np
 
 from navirl_cli import __version__
 from navirl_cli.arrays import FloatArray
-from navirl_cli.artefacts.schema import first_problem
-from navirl_cli.artefacts.versions import VERSION, is_later, upgraded
+from navirl_cli.artefacts.schema import first_problem, shown
+from navirl_cli.artefacts.versions import VERSION, is_known, upgraded
 from navirl_cli.errors import ArtefactError, brief
 from navirl_cli.files import replacing
 
@@ -62,9 +62,9 @@ def read_json(path: Path, kind: str) -> dict[str, Any]:
     if found != f"navirl/{kind}":
         what = f"a file of format {brief(found)}" if isinstance(found, str) else "other JSON"
         raise ArtefactError(f"{path}: expected navirl {kind} (format 'navirl/{kind}'), found {what}")
-    if is_later(document):
-        found = brief(document["version"])
-        raise ArtefactError(f"{path}: version: expected at most {VERSION}, found {found}; update navirl to read it")
+    if not is_known(document.get("version")):
+        other = shown(document.get("version"))
+        raise ArtefactError(f"{path}: version: expected 1 to {VERSION}, found {other}; later ones need a later navirl")
     problem = first_problem(upgraded(document, kind), _schema(kind))
     if problem is not None:
         raise ArtefactError(f"{path}: breaks the schema of navirl {kind} at {problem}")
