@@ -250,8 +250,8 @@ def test_what_is_no_picture_is_named(write, tmp_path):
     for name, problem in (
         ("gone.png", r"expected a picture for the report, cannot read it \(No such file or directory\); draw it again"),
         (".", r"cannot read it \(Is a directory\)"),
-        ("text.png", r"expected a picture in a \.png or \.svg file, found another"),
-        ("plot.pdf", r"expected a picture in a \.png or \.svg file, found another"),
+        ("text.png", r"expected a PNG or SVG picture, found another file"),
+        ("plot.pdf", r"expected a PNG or SVG picture, found another file"),
     ):
         path = tmp_path / name
         with pytest.raises(ArtefactError, match=f"^{re.escape(str(path))}: .*{problem}"):

@@ -314,8 +314,8 @@ def test_levels_that_can_be_drawn_are(plot, level):
 def test_levels_without_an_interval_are_refused_by_the_schema(plot, level):
     result = plot([replace(parabola(), level=level)])
     assert result.exit_code == 1
-    found = "less than or equal to the minimum of 0" if level <= 0 else "greater than the maximum of 0.9999"
-    assert f"breaks the schema of navirl reward at profiles/0/level: {level} is {found}\n" in result.stderr
+    expected = "more than 0" if level <= 0 else "0.9999 or less"
+    assert f"reward at profiles/0/level: expected {expected}, found {level}\n" in result.stderr
 
 
 def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(plot):

@@ -139,11 +139,11 @@ def test_cross_validation(files, full, evidence):
     assert sum(found["steps"]) == full["steps"]
     assert list(found["models"]) == ["learnt", "no person", "shortest path", "uniform"]
     for model in found["models"].values():
-        assert model["per_step"] == pytest.approx(sum(model["log_likelihood"]) / full["steps"])
+        assert model["log_likelihood_per_step"] == pytest.approx(sum(model["log_likelihood"]) / full["steps"])
     assert sum(found["models"]["uniform"]["log_likelihood"]) == pytest.approx(evidence.uniform_log_likelihood())
     assert list(found["features"]) == NAMES
     row = next(line for line in text.splitlines() if line.startswith("learnt "))
-    assert row.split()[1] == f"{found['models']['learnt']['per_step']:.4f}"
+    assert row.split()[1] == f"{found['models']['learnt']['log_likelihood_per_step']:.4f}"
     root = np.sqrt(np.mean(np.square(found["features"]["a_p"]["mismatch_standard_errors"])))
     table = text[text.index("|f - E f|") :].splitlines()
     assert table[4].split()[:2] == ["a_p", f"{root:.2f}"]

@@ -168,7 +168,7 @@ def test_extract_prints_and_writes_the_gain(navirl, tmp_path):
     assert lines[-1].split()[3] == "6"
     written = read_json(Path("demos.json"), "demonstrations")["gain"]
     assert [gain["log"] for gain in written["logs"]] == ["a.mcap", "b.mcap"]
-    assert written["m_s_per_n"] == pytest.approx(K, rel=0.02)
+    assert written["gain_m_s_n"] == pytest.approx(K, rel=0.02)
     assert len(read_demonstrations(Path("demos.json"))) == 2
     printed = json.loads(navirl("extract", one, two, "-o", "x.json", "--gain", "--json").stdout)
     assert printed["gain"] == written

@@ -33,7 +33,7 @@ def many(kind):
 SCHEMA = many(
     keys(
         log=TEXT,
-        files=many(keys(file=TEXT, profile=TEXT, library=TEXT, bytes=COUNT)),
+        files=many(keys(file=TEXT, profile=TEXT, library=TEXT, size_bytes=COUNT)),
         start_ns=either(COUNT),
         end_ns=either(COUNT),
         topics=many(
@@ -45,8 +45,9 @@ SCHEMA = many(
                 start_ns=either(COUNT),
                 end_ns=either(COUNT),
                 rate_hz=either(NUMBER),
-                silences=COUNT,
-                longest_silence_s=either(NUMBER),
+                gaps=COUNT,
+                longest_gap_s=either(NUMBER),
+                longest_gap_at_s=either(NUMBER),
                 stamp_minus_receipt_s=either(NUMBER),
             )
         ),
@@ -111,12 +112,12 @@ def test_a_sample_log_as_text(navirl):
 def test_a_sample_log_as_json(inspect):
     (view,), _ = inspect(SAMPLES / "p01.mcap")
     assert view["log"] == "p01.mcap"
-    assert [file["bytes"] for file in view["files"]] == [(SAMPLES / "p01.mcap").stat().st_size]
+    assert [file["size_bytes"] for file in view["files"]] == [(SAMPLES / "p01.mcap").stat().st_size]
     flow = topics_of(view)["/odom"]
     assert (flow["type"], flow["encoding"], flow["messages"]) == ("nav_msgs/msg/Odometry", "cdr", 6691)
     assert flow["rate_hz"] == pytest.approx(30.0, abs=0.1)
     assert (flow["end_ns"] - flow["start_ns"]) / 1e9 == pytest.approx(223.0, abs=0.1)
-    assert (flow["silences"], flow["longest_silence_s"]) == (0, None)
+    assert (flow["gaps"], flow["longest_gap_s"]) == (0, None)
     assert flow["stamp_minus_receipt_s"] == pytest.approx(-0.002, abs=0.002)
     assert view["roles"]["wrench"] == {"topics": ["/wrench"], "reason": "the only one that fits", "problem": None}
     assert view["clocks"] == view["notes"] == view["damage"] == []
@@ -196,10 +197,10 @@ def test_no_messages_at_all(inspect, navirl, tmp_path):
     assert "no wrench: expected a topic of type geometry_msgs/WrenchStamped" in text
 
 
-# silences
+# gaps
 
 
-def test_silences_of_regular_topics_are_told(inspect, navirl, tmp_path):
+def test_gaps_of_regular_topics_are_counted(inspect, navirl, tmp_path):
     log = nav.drive(20.0)
     quiet = [(5.0, 8.5), (12.0, 12.7)]
     log.messages = [
@@ -212,8 +213,8 @@ def test_silences_of_regular_topics_are_told(inspect, navirl, tmp_path):
     path = log.write(tmp_path / "run.mcap")
     (view,), _ = inspect(path)
     flows = topics_of(view)
-    assert {topic: flow["silences"] for topic, flow in flows.items() if flow["silences"]} == {"/odom": 2}
-    assert flows["/odom"]["longest_silence_s"] == pytest.approx(3.5, abs=0.1)
+    assert {topic: flow["gaps"] for topic, flow in flows.items() if flow["gaps"]} == {"/odom": 2}
+    assert flows["/odom"]["longest_gap_s"] == pytest.approx(3.5, abs=0.1)
     assert flows["/wrench"]["rate_hz"] == pytest.approx(100.0, abs=0.5)
     assert flows["/map"]["rate_hz"] is None
     shown = rows_of(navirl("inspect", path).stdout, "topic")
@@ -221,7 +222,7 @@ def test_silences_of_regular_topics_are_told(inspect, navirl, tmp_path):
     assert shown["/wrench"].split()[-4:-1] == ["0", "-", "-"]
 
 
-def test_a_pause_between_files_is_a_silence(inspect, tmp_path):
+def test_a_pause_between_files_is_a_gap(inspect, tmp_path):
     folder = tmp_path / "bag"
     folder.mkdir()
     whole = nav.drive(20.0)
@@ -232,13 +233,13 @@ def test_a_pause_between_files_is_a_silence(inspect, tmp_path):
     (view,), _ = inspect(folder)
     assert view["log"] == "bag"
     assert [file["file"] for file in view["files"]] == ["bag_0.mcap", "bag_1.mcap"]
-    assert {topic: flow["silences"] for topic, flow in topics_of(view).items()} == {
+    assert {topic: flow["gaps"] for topic, flow in topics_of(view).items()} == {
         "/map": 0,
         "/odom": 1,
         "/tf": 1,
         "/wrench": 1,
     }
-    assert topics_of(view)["/wrench"]["longest_silence_s"] == pytest.approx(3.0, abs=0.05)
+    assert topics_of(view)["/wrench"]["longest_gap_s"] == pytest.approx(3.0, abs=0.05)
 
 
 # clocks

@@ -15,7 +15,7 @@ from sphinx.util import logging
 
 from navirl_cli.artefacts.store import schema_path
 from navirl_cli.cli import COMMANDS, cli
-from navirl_cli.documents.tables import Format, Table, written
+from navirl_cli.documents.tables import Column, Format, Table, written
 from navirl_cli.logs.roles.topics import ROLES
 from navirl_cli.reports.evaluation import metrics_table
 
@@ -103,7 +103,7 @@ def message_types() -> Iterator[tuple[str, str]]:
             for one in role.message_types
         ]
         needed = "Needed by `extract`." if role.needed else "Optional."
-        table = written(Table.of_texts(("message type", "fields that are read"), rows), Format.MARKDOWN)
+        table = written(Table((Column("message type"), Column("fields that are read")), tuple(rows)), Format.MARKDOWN)
         rule = f" Where several topics fit: {escaped(role.rule)}." if role.rule else ""
         parts.append(f"## {role.name}\n\n{needed}{rule}\n\n{unescaped(table)}\n")
     yield "message-types.md", "\n".join(parts)

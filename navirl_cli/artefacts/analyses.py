@@ -18,7 +18,7 @@ def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
     return {
         "seed": found.seed,
         "failed": found.failed,
-        "told": found.told.tolist(),
+        "identified_draws": found.told.tolist(),
         "stopped_early": found.stopped_early,
         "standard_errors": numbers(found.standard_errors),
         "lower": numbers(lower),
@@ -71,7 +71,7 @@ def validation_document(found: Validation) -> dict[str, Any]:
         "steps": found.steps.tolist(),
         "statuses": [status.value for status in found.statuses],
         "models": {
-            model: {"log_likelihood": numbers(values), "per_step": number(found.per_step(model))}
+            model: {"log_likelihood": numbers(values), "log_likelihood_per_step": number(found.per_step(model))}
             for model, values in found.log_likelihoods.items()
         },
         "features": {

@@ -18,6 +18,8 @@ from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
 from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
 
+#: Numbers beyond these are refused: no trial holds them, and they would cost memory without end. In the lists' units.
+_MOST = {"t_s": 1e6, "x_m": 1e8, "y_m": 1e8, "yaw_rad": 1e6, "force_x_n": 1e6, "force_y_n": 1e6}
 #: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
 DECIMALS = 6
 
@@ -65,18 +67,8 @@ def gain_document(gains: Sequence[tuple[str, Gain | None]]) -> dict[str, Any] | 
     known = [(log, gain) for log, gain in gains if gain is not None]
     if not known:
         return None
-    logs = [{"log": log, **_gain_written(gain)} for log, gain in known]
-    return {**_gain_written(pooled([gain for _, gain in known])), "logs": logs}
-
-
-def _gain_written(gain: Gain) -> dict[str, Any]:
-    """A gain as JSON."""
-    return {
-        "m_s_per_n": gain.gain_m_s_n,
-        "standard_error": gain.standard_error_m_s_n,
-        "pushes": gain.pushes,
-        "delay_s": gain.delay_s,
-    }
+    logs = [{"log": log, **vars(gain)} for log, gain in known]
+    return {**vars(pooled([gain for _, gain in known])), "logs": logs}
 
 
 def read_demonstrations(path: Path) -> list[Demonstration]:
@@ -136,8 +128,8 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
             {
                 "start_s": round(contact.start_s, DECIMALS),
                 "end_s": round(contact.end_s, DECIMALS),
-                "peak_n": round(contact.peak_force_n, DECIMALS),
-                "impulse_ns": _rounded(np.array(contact.impulse_n_s)),
+                "peak_force_n": round(contact.peak_force_n, DECIMALS),
+                "impulse_n_s": _rounded(np.array(contact.impulse_n_s)),
             }
             for contact in d.contacts
         ],
@@ -181,8 +173,10 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
     if content["map"] not in grids:
         raise ValueError(f"demonstration {name}: its map {content['map']!r} is not in the file")
     try:
-        x, y, force_x, force_y = (content[key] for key in ("x_m", "y_m", "force_x_n", "force_y_n"))
-        forceless = force_x is None or force_y is None
+        grid = grids[content["map"]]
+        x_bounds, y_bounds = _around(grid)
+        x, y = _numbers(content, "x_m", x_bounds), _numbers(content, "y_m", y_bounds)
+        forceless = content["force_x_n"] is None or content["force_y_n"] is None
         return Demonstration(
             id=name,
             participant=content["participant"],
@@ -190,15 +184,17 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             corrected=content["corrected"],
             cycle=content["cycle"],
             start_ns=content["start_ns"],
-            t_s=np.array(content["t_s"], dtype=float),
-            xy_m=np.stack([np.array(x, dtype=float), np.array(y, dtype=float)], axis=1),
-            yaw_rad=np.array(content["yaw_rad"], dtype=float),
-            force_n=None if forceless else np.stack([np.array(force_x, float), np.array(force_y, float)], axis=1),
+            t_s=_numbers(content, "t_s"),
+            xy_m=np.stack([x, y], axis=1),
+            yaw_rad=_numbers(content, "yaw_rad"),
+            force_n=None
+            if forceless
+            else np.stack([_numbers(content, "force_x_n"), _numbers(content, "force_y_n")], axis=1),
             contacts=None if content["contacts"] is None else tuple(_contact(one) for one in content["contacts"]),
             goal_m=(content["goal_m"][0], content["goal_m"][1]),
             people_m=np.array(content["people_m"], dtype=float).reshape(-1, 2),
             robot_radius_m=content["robot_radius_m"],
-            grid=grids[content["map"]],
+            grid=grid,
             cells=np.array(content["cells"], dtype=np.int64),
             log=content["log"],
             tracks=tuple(_track(track) for track in content.get("tracks", ())),
@@ -211,15 +207,37 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
         raise ValueError(f"demonstration {name}: {error}") from error
 
 
+def _numbers(content: Mapping[str, Any], name: str, bounds: tuple[float, float] | None = None) -> FloatArray:
+    """(n,) numbers of a list.
+
+    Raises:
+        ValueError: One of them is out of bounds.
+    """
+    values = np.array(content[name], dtype=float)
+    least, most = bounds or (-_MOST[name], _MOST[name])
+    beyond = values[(values < least) | (values > most)]
+    if len(beyond):
+        raise ValueError(f"{name}: expected numbers from {least:g} to {most:g}, found {beyond[0]:g}")
+    return values
+
+
+def _around(grid: Grid) -> tuple[tuple[float, float], tuple[float, float]]:
+    """From where to where x and y may be, m: on the map, or beside it by no more than its length."""
+    rows, columns = grid.shape
+    beside = max(rows, columns) * grid.resolution_m
+    (x, y), (width, height) = grid.origin_m, (columns * grid.resolution_m, rows * grid.resolution_m)
+    return (x - beside, x + width + beside), (y - beside, y + height + beside)
+
+
 def _contact(content: Mapping[str, Any]) -> Contact:
     """One contact of a demonstration."""
-    x, y = content["impulse_ns"]
-    return Contact(content["start_s"], content["end_s"], content["peak_n"], (x, y))
+    x, y = content["impulse_n_s"]
+    return Contact(content["start_s"], content["end_s"], content["peak_force_n"], (x, y))
 
 
 def _track(content: Mapping[str, Any]) -> PersonTrack:
     """How a person moved in a demonstration."""
-    t, x, y = (np.array(content[key], dtype=float) for key in ("t_s", "x_m", "y_m"))
+    t, x, y = (_numbers(content, key) for key in ("t_s", "x_m", "y_m"))
     try:
         return PersonTrack(content["name"], t, np.stack([x, y], axis=1))
     except DemonstrationError as error:  # which does not know whose track it is

@@ -15,8 +15,6 @@ from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
 Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
-#: Metrics of files of version 1 by their present names.
-_RENAMED = {"peak_n": "peak_force_n", "impulse_ns": "impulse_n_s"}
 
 
 def metrics_document(

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from navirl_cli.documents.inline import plain_of
 from navirl_cli.documents.tables import Table
+from navirl_cli.errors import ArtefactError
+
+#: The first bytes of a PNG file.
+PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True)
@@ -41,13 +46,35 @@ class Bullets:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with what is written below it."""
+    """A figure with its caption."""
 
     #: An existing .png or .svg file.
     path: Path
     caption: str
-    #: What who cannot see the picture is told; without it the caption.
+    #: Text for readers who cannot see the picture; the caption where it is empty.
     alt: str = ""
+
+    @property
+    def alternative(self) -> str:
+        """The text for readers who cannot see the picture, without marks."""
+        return plain_of(self.alt) or plain_of(self.caption) or plain_of(self.path.stem)
+
+    def read(self) -> tuple[str, bytes]:
+        """Media type and bytes of the file.
+
+        Raises:
+            ArtefactError: The file is missing, cannot be read, or is neither PNG nor SVG.
+        """
+        try:
+            content = self.path.read_bytes()
+        except OSError as error:
+            problem = f"expected a picture for the report, cannot read it ({error.strerror}); draw it again"
+            raise ArtefactError(f"{self.path}: {problem}") from error
+        if self.path.suffix == ".png" and content.startswith(PNG_HEAD):
+            return "image/png", content
+        if self.path.suffix == ".svg" and b"<svg" in content:
+            return "image/svg+xml", content
+        raise ArtefactError(f"{self.path}: expected a PNG or SVG picture, found another file; draw it as one of these")
 
 
 Block: TypeAlias = Heading | Paragraph | Bullets | Table | Picture

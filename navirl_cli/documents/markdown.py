@@ -6,7 +6,6 @@ from urllib.parse import quote
 
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.inline import markdown_escaped, markdown_of
-from navirl_cli.documents.pictures import alt_of, read_picture
 from navirl_cli.documents.tables import Format, Table, written
 
 
@@ -46,8 +45,8 @@ def _block(block: Block, folder: Path) -> str:
 
 def _picture(picture: Picture, folder: Path) -> str:
     """A link to the picture above its caption."""
-    read_picture(picture.path)
+    picture.read()
     path = picture.path.parent.resolve() / picture.path.name
     link = quote(os.fsencode(Path(os.path.relpath(path, folder.resolve())).as_posix()))
-    image = f"![{markdown_escaped(alt_of(picture))}]({link})"
+    image = f"![{markdown_escaped(picture.alternative)}]({link})"
     return "\n\n".join((image, markdown_of(picture.caption))) if picture.caption else image

@@ -7,10 +7,10 @@ from functools import cache
 from hashlib import sha256
 from html import escape
 from importlib.resources import files
+from struct import unpack
 
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.document import PNG_HEAD, Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.inline import html_of, plain_of
-from navirl_cli.documents.pictures import alt_of, read_picture, shown_size
 from navirl_cli.documents.tables import MINUS, Cell, Table, is_missing, sort_key
 
 #: The class of a cell, by whether its column holds numbers.
@@ -158,12 +158,20 @@ def _sort_key(cell: Cell) -> str:
 
 def _picture(picture: Picture) -> str:
     """A picture with its bytes, and its caption."""
-    kind, content = read_picture(picture.path)
-    size = shown_size(content)
+    media_type, content = picture.read()
+    size = _shown_size(content)
     attributes = f' width="{size[0]}" height="{size[1]}"' if size else ""
-    source = f"data:{kind};base64,{b64encode(content).decode()}"
+    source = f"data:{media_type};base64,{b64encode(content).decode()}"
     caption = f"\n<figcaption>{html_of(picture.caption)}</figcaption>" if picture.caption else ""
-    return f'<figure>\n<img src="{source}" alt="{escape(alt_of(picture))}"{attributes}>{caption}\n</figure>'
+    return f'<figure>\n<img src="{source}" alt="{escape(picture.alternative)}"{attributes}>{caption}\n</figure>'
+
+
+def _shown_size(content: bytes) -> tuple[int, int] | None:
+    """Width and height of a PNG on the page, in its pixels: half its own, because figures are drawn for print."""
+    if not content.startswith(PNG_HEAD) or len(content) < 24:
+        return None
+    width, height = unpack(">II", content[16:24])  # IHDR is the first chunk
+    return (width + 1) // 2, (height + 1) // 2
 
 
 def _lines(parts: Iterable[str]) -> str:

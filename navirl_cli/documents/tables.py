@@ -315,13 +315,3 @@ def _aligned(rows: Sequence[Sequence[str]], right: Sequence[bool]) -> list[list[
     return [
         [text.rjust(w) if r else text.ljust(w) for text, w, r in zip(row, widths, right, strict=True)] for row in rows
     ]
-
-
-def formatted(header: Sequence[str], rows: Iterable[Sequence[str]], how: Format) -> str:
-    """A table of texts in one format: for callers that do not hold values yet."""
-    return written(Table.of_texts(header, rows), how)
-
-
-def text_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of texts as text: for callers that do not hold values yet."""
-    return formatted(header, rows, Format.TEXT)

@@ -69,12 +69,7 @@ def gain_table(gain: Mapping[str, Any]) -> Table:
         gain: As in a demonstrations file.
     """
     lines = [*gain["logs"], *([{"log": "all", **gain}] if len(gain["logs"]) > 1 else [])]
-    return Table(
-        _GAIN,
-        tuple(
-            (line["log"], line["m_s_per_n"], line["standard_error"], line["pushes"], line["delay_s"]) for line in lines
-        ),
-    )
+    return Table(_GAIN, tuple(tuple(line[column.name] for column in _GAIN) for line in lines))
 
 
 def published_notes(results: Iterable[Extraction]) -> list[str]:

@@ -13,8 +13,9 @@ from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Cell, Column, Interval, Table
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import parameters_of, terms_with
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.term import Parameter
 from navirl_cli.irl.uncertainty import condition_number, correlation
 
 #: Participants below which their scatter says little (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -34,7 +35,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
     status = Status(content["status"])
     return [
         parameter_table(content),
-        meanings_of_parameters(),
+        meanings_of_parameters(content),
         *correlation_table(content),
         likelihood_table(content),
         Paragraph(counts(content)),
@@ -85,9 +86,14 @@ def _interval(lower: float | None, upper: float | None) -> Interval | None:
     return None if lower is None or upper is None else Interval(lower, upper)
 
 
-def meanings_of_parameters() -> Bullets:
+def _parameters(content: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """What is known of the parameters beside their values."""
+    return parameters_of(terms_with([one["name"] for one in content["parameters"]]))
+
+
+def meanings_of_parameters(content: Mapping[str, Any]) -> Bullets:
     """What each parameter is."""
-    return Bullets(tuple(f"{one.name}: {one.meaning}" for one in Reward.named({}).parameters))
+    return Bullets(tuple(f"{one.name}: {one.meaning}" for one in _parameters(content)))
 
 
 def correlation_table(content: Mapping[str, Any]) -> list[Block]:
@@ -141,7 +147,7 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
     lost += [f"{found['stopped_early']} stopped early"] if found["stopped_early"] else []
     lost += [
         f"{one['name']} identified in {identified} of them"
-        for one, identified in zip(content["parameters"], found["told"], strict=True)
+        for one, identified in zip(content["parameters"], found["identified_draws"], strict=True)
         if identified < count
     ]
     return [Paragraph(", ".join([f"Bootstrap: {count} draws of participants (seed {found['seed']})", *lost]) + ".")]
@@ -149,7 +155,7 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
 
 def profile_table(content: Mapping[str, Any]) -> list[Block]:
     """Intervals from the profile likelihoods that were followed."""
-    bounds = {one.name: (one.lower, one.upper) for one in Reward.named({}).parameters}
+    bounds = {one.name: (one.lower, one.upper) for one in _parameters(content)}
     columns = (
         Column("profile"),
         Column("level", "level %", decimals=0, scale=100),
@@ -180,7 +186,8 @@ def validation_tables(content: Mapping[str, Any]) -> list[Block]:
         return []
     names, steps, features = found["left_out"], found["steps"], found["features"]
     likelihoods = tuple(
-        (model, one["per_step"], *_per_step(one["log_likelihood"], steps)) for model, one in found["models"].items()
+        (model, one["log_likelihood_per_step"], *_per_step(one["log_likelihood"], steps))
+        for model, one in found["models"].items()
     )
     mismatches = tuple(
         (name, _root_mean_square(one["mismatch_standard_errors"], one["identified"]), *one["mismatch_standard_errors"])

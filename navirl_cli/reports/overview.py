@@ -93,7 +93,7 @@ def overview_document(view: Overview) -> dict[str, Any]:
                 "file": one.path.name,
                 "profile": one.profile,
                 "library": one.library,
-                "bytes": one.path.stat().st_size,
+                "size_bytes": one.path.stat().st_size,
             }
             for one in view.contents
         ],
@@ -125,7 +125,8 @@ def _flow_document(flow: Flow) -> dict[str, Any]:
         "start_ns": flow.start_ns,
         "end_ns": flow.end_ns,
         "rate_hz": flow.rate_hz,
-        "silences": flow.gaps,
-        "longest_silence_s": flow.longest_s if flow.gaps else None,
+        "gaps": flow.gaps,
+        "longest_gap_s": flow.longest_s if flow.gaps else None,
+        "longest_gap_at_s": flow.longest_at_s if flow.gaps else None,
         "stamp_minus_receipt_s": flow.offset_s,
     }

@@ -17,6 +17,7 @@ from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Rank
+from navirl_cli.irl.reward import PAPER_TERMS
 from navirl_cli.reports.evaluation import group_table, uniform_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
@@ -74,9 +75,9 @@ def report_of(
         Paragraph(_summary(demonstrations, learnt, content)),
         *_warnings(content, ranks),
         Heading("Parameters"),
-        Paragraph(_FORMULA),
+        *([Paragraph(_FORMULA)] if learnt.reward.terms == PAPER_TERMS else []),
         parameter_table(content),
-        meanings_of_parameters(),
+        meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
         *_pictures(figures, "profile"),
