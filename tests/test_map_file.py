@@ -235,7 +235,7 @@ REMEDY = "; correct it, or save the map again with map_saver_cli"
         ({"image": '"a\\0b"'}, "one that does not decode ('embedded null byte')"),
         ({"image": "text.png"}, "found something else at {folder}/text.png" + REMEDY),
         ({"image": "photo.jpg"}, "found something else at {folder}/photo.jpg" + REMEDY),
-        ({"image": "cut.pgm"}, "found at {folder}/cut.pgm: one that does not decode ('image file is truncated"),
+        ({"image": "cut.pgm"}, "found at {folder}/cut.pgm: one that does not decode ("),
         ({"image": "few.pgm"}, "found at {folder}/few.pgm: one that does not decode ('not enough image data')"),
         ({"image": "broken.png"}, "found at {folder}/broken.png: one that does not decode ("),
         ({"image": "float.ppm"}, "one that does not decode ('its numbers are not colours')"),

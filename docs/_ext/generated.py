@@ -31,13 +31,25 @@ class Markdown(click.HelpFormatter):
         super().__init__()
         self.level = level
 
+    def emit(self, text: str) -> None:
+        """Markdown as it is."""
+        self.buffer.append(text)
+
+    def write(self, string: str) -> None:
+        """What a command writes without a layout is an example to copy."""
+        if string.strip():
+            self.emit(f"```sh\n{string.strip()}\n```\n\n")
+
+    def write_paragraph(self) -> None:
+        """Every part ends with an empty line already."""
+
     def write_usage(self, prog: str, args: str = "", prefix: str | None = None) -> None:  # noqa: ARG002
         """The line of usage."""
-        self.write(f"```text\n{prog} {args}\n```\n\n")
+        self.emit(f"```text\n{prog} {args}\n```\n\n")
 
     def write_heading(self, heading: str) -> None:
         """A section's heading."""
-        self.write(f"{'#' * self.level} {heading}\n\n")
+        self.emit(f"{'#' * self.level} {heading}\n\n")
 
     def indent(self) -> None:
         """Markdown knows no indent."""
@@ -49,14 +61,14 @@ class Markdown(click.HelpFormatter):
         """Paragraphs; what click must not wrap is code."""
         for paragraph in text.split("\n\n"):
             if paragraph.startswith("\b"):
-                self.write(f"```text\n{paragraph.removeprefix(chr(8)).strip()}\n```\n\n")
+                self.emit(f"```text\n{paragraph.removeprefix(chr(8)).strip()}\n```\n\n")
             else:
-                self.write(f"{escaped(' '.join(paragraph.split()))}\n\n")
+                self.emit(f"{escaped(' '.join(paragraph.split()))}\n\n")
 
     def write_dl(self, rows: Any, col_max: int = 30, col_spacing: int = 2) -> None:  # noqa: ARG002
         """Names with what they mean."""
         for name, text in rows:
-            self.write(f"`{name}`\n: {escaped(' '.join(text.split())) or '-'}\n\n")
+            self.emit(f"`{name}`\n: {escaped(' '.join(text.split())) or '-'}\n\n")
 
 
 def escaped(text: str) -> str:
