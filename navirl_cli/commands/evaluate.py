@@ -10,8 +10,6 @@ from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
     demonstrations_in,
     demos_argument,
     echo,
@@ -23,9 +21,10 @@ from navirl_cli.commands.shared import (
     progress_bar,
     seed_option,
 )
+from navirl_cli.commands.types import Choice, FilePath, Number
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import ENDINGS, Format, written
-from navirl_cli.errors import ArtefactError, DemonstrationError
+from navirl_cli.errors import ArtefactError, DemonstrationError, unknown
 from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import MOST, Precision
 from navirl_cli.evaluation.groups import FIELDS
@@ -49,8 +48,9 @@ class Names(click.ParamType):  # type: ignore[type-arg]
         if value == "all":
             return tuple(BY_NAME.values())
         names = [name.strip() for name in value.split(",")]
-        if unknown := [name for name in names if name not in BY_NAME]:
-            self.fail(f"unknown metric {unknown[0]!r}; navirl evaluate --list-metrics lists them", param, ctx)
+        for name in names:
+            if name not in BY_NAME:
+                self.fail(f"{unknown('', name, BY_NAME)}; --list-metrics lists all", param, ctx)
         return tuple(BY_NAME[name] for name in dict.fromkeys(names))
 
 
@@ -88,7 +88,7 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
     "--by",
     "fields",
     multiple=True,
-    type=click.Choice(list(FIELDS)),
+    type=Choice(list(FIELDS)),
     help="Group by this; repeatable.  [default: condition, cycle and set]",
 )
 @click.option(
@@ -116,7 +116,7 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
 @click.option(
     "--format",
     "style",
-    type=click.Choice([how.value for how in Format]),
+    type=Choice([how.value for how in Format]),
     default=Format.TEXT.value,
     show_default=True,
     help="How to print.",

@@ -9,9 +9,6 @@ import click
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
-    Point,
     bytes_bar,
     echo,
     echo_json,
@@ -24,6 +21,7 @@ from navirl_cli.commands.shared import (
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.types import Choice, FilePath, Number, Point
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.rasterize import Rule
@@ -43,7 +41,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 @output_option("Demonstrations file to write.")
 @click.option(
     "--split",
-    type=click.Choice([split.value for split in Split]),
+    type=Choice([split.value for split in Split]),
     default=Split.GOAL.value,
     show_default=True,
     help="Trials start at new goals, at rests, or the log is one trial.",
@@ -55,7 +53,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 @click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m.")
 @click.option(
     "--rasterizer",
-    type=click.Choice([rule.value for rule in Rule]),
+    type=Choice([rule.value for rule in Rule]),
     default=ExtractSettings.rasterizer.value,
     show_default=True,
     help="How a path becomes cells: the study's rule, the cells crossed, or the chain code.",
@@ -93,7 +91,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 @click.option(
     "--time",
     "time_source",
-    type=click.Choice([source.value for source in TimeSource]),
+    type=Choice([source.value for source in TimeSource]),
     default=TimeSource.HEADER.value,
     show_default=True,
     help="When a message was measured: its header's stamp, or when the recorder got it.",

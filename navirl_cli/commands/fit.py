@@ -8,8 +8,6 @@ import click
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
     demonstrations_in,
     demos_argument,
     echo,
@@ -22,6 +20,7 @@ from navirl_cli.commands.shared import (
     say,
     seed_option,
 )
+from navirl_cli.commands.types import Choice, FilePath, Number
 from navirl_cli.commands.usage import as_options
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
@@ -61,7 +60,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
 )
 @click.option(
     "--method",
-    type=click.Choice([method.value for method in Method]),
+    type=Choice([method.value for method in Method]),
     default=Method.NEWTON.value,
     show_default=True,
     help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam) on the same exact gradient.",
@@ -70,14 +69,14 @@ from navirl_cli.reports.fit import remarks, report, warnings
     "--condition",
     "conditions",
     multiple=True,
-    type=click.Choice([condition.value for condition in Condition]),
+    type=Choice([condition.value for condition in Condition]),
     help="Learn from these trials only; repeatable.",
 )
 @click.option("--cycle", type=int, help="Learn from the trials of this cycle only.")
 @click.option("--only-corrected", is_flag=True, help="Learn from trials in which the person intervened only.")
 @click.option(
     "--steps",
-    type=click.Choice([steps.value for steps in Steps]),
+    type=Choice([steps.value for steps in Steps]),
     default=Steps.ALL.value,
     show_default=True,
     help="Learn from all steps of a path, or from those during contact only.",
@@ -99,7 +98,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
 )
 @click.option(
     "--cross-validate",
-    type=click.Choice(["participant"]),
+    type=Choice(["participant"]),
     help="Foretell each participant from the others, against simpler models.",
 )
 @seed_option

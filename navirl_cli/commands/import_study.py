@@ -6,16 +6,8 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.commands.shared import (
-    FilePath,
-    echo_json,
-    finish,
-    force_option,
-    json_option,
-    output_option,
-    progress_bar,
-    say,
-)
+from navirl_cli.commands.shared import echo_json, finish, force_option, json_option, output_option, progress_bar, say
+from navirl_cli.commands.types import FilePath
 from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import check_writable, new_folder

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from navirl_cli.commands.shared import (
-    FilePath,
     bytes_bar,
     echo,
     echo_json,
@@ -15,6 +14,7 @@ from navirl_cli.commands.shared import (
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.types import FilePath
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import LogError
 from navirl_cli.logs.overview import overview

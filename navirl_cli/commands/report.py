@@ -8,7 +8,6 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.shared import (
-    FilePath,
     demonstrations_in,
     demos_argument,
     finish,
@@ -17,6 +16,7 @@ from navirl_cli.commands.shared import (
     progress_bar,
     seed_option,
 )
+from navirl_cli.commands.types import FilePath
 from navirl_cli.errors import ArtefactError
 from navirl_cli.evaluation.drawn import MOST, Precision
 from navirl_cli.files import Input, check_writable, replacing

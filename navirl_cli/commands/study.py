@@ -10,7 +10,6 @@ import click
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
     bytes_bar,
     demonstrations_in,
     echo,
@@ -26,6 +25,7 @@ from navirl_cli.commands.shared import (
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.types import FilePath
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings

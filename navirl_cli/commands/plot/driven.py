@@ -7,15 +7,8 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, trial_of, trial_option
-from navirl_cli.commands.shared import (
-    FilePath,
-    demonstrations_in,
-    demos_argument,
-    progress_bar,
-    samples_option,
-    say,
-    seed_option,
-)
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.types import FilePath
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration

@@ -7,7 +7,7 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.commands.plot.page import Page, page_options
-from navirl_cli.commands.shared import FilePath
+from navirl_cli.commands.types import FilePath
 from navirl_cli.errors import ArtefactError
 
 

@@ -10,7 +10,9 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import Function, demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.types import Choice
+from navirl_cli.commands.usage import Function
 
 if TYPE_CHECKING:
     from navirl_cli.arrays import FloatArray
@@ -97,7 +99,7 @@ def scene_options(function: Function) -> Function:
         click.option(
             "--overlay",
             multiple=True,
-            type=click.Choice((DEMOS, SAMPLES)),
+            type=Choice((DEMOS, SAMPLES)),
             help="Draw paths over the map: demonstrated in this scene, or sampled from the policy; repeatable.",
         ),
         click.option(

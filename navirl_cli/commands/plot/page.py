@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.commands.shared import FilePath, Function, force_option
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.commands.shared import force_option
+from navirl_cli.commands.types import Choice, FilePath
+from navirl_cli.commands.usage import Function
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.files import check_writable
 
 if TYPE_CHECKING:
@@ -102,7 +104,7 @@ def page_options(function: Function) -> Function:
         ),
         click.option(
             "--style",
-            type=click.Choice(STYLES),
+            type=Choice(STYLES),
             default="paper",
             show_default=True,
             help="paper: 300 dpi; screen: 600 dpi; dark: light ink on near-black, 600 dpi.",
@@ -128,4 +130,4 @@ def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "D
     for one in demonstrations:
         if trial in {None, one.id}:
             return one
-    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
+    raise DemonstrationError(unknown("`trial`", trial, [one.id for one in demonstrations]))
