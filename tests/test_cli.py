@@ -343,20 +343,6 @@ def test_evaluate_without_a_reward_measures_no_learnt_paths(navirl, work):
     assert "m.txt: expected a name that ends in one of .json, .csv, .md, .tex, found '.txt'" in message
 
 
-def test_plot_draws_every_kind(navirl, work):
-    reward = ("--reward", work / "reward.json")
-    for kind, words in (
-        ("paths", ()),
-        ("policy", (*reward, "--trial", "p01/3")),
-        ("reward", reward),
-        ("properties", (*reward, "--samples", "5")),
-    ):
-        for suffix, magic in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
-            name = kind + suffix
-            assert navirl("plot", kind, work / "demos.json", *words, "-o", name).stdout == f"{name}\n"
-            assert Path(name).read_bytes().startswith(magic)
-
-
 def test_plot_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
     demos, reward = work / "demos.json", ("--reward", work / "reward.json")
     for words, message in (

@@ -6,10 +6,11 @@ from typing import Any
 
 import click
 
+from navirl_cli.commands.usage import WithExamples
 from navirl_cli.errors import unknown
 
 
-class LazyGroup(click.Group):
+class LazyGroup(WithExamples, click.Group):
     """A group that imports a command when it is called.
 
     Args:

@@ -10,33 +10,40 @@ from typing import Any
 import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
-from navirl_cli.commands.types import FilePath, RoleTopic
+from navirl_cli.commands.types import Count, FilePath, RoleTopic
 from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 
+#: As :data:`navirl_cli.evaluation.drawn.MOST`, which is not imported before paths are sampled.
+MOST_SAMPLES = 100_000
+
 force_option = click.option("--force", is_flag=True, help="Replace existing files.")
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON in place of the table.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 seed_option = click.option(
-    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of everything drawn by chance."
-)
-samples_option = click.option(
-    "--samples",
-    default=100,
-    show_default=True,
-    type=click.IntRange(1, 100_000),
-    help="Paths drawn from the learnt policy for every demonstration.",
+    "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
 demos_argument = click.argument("demos", type=FilePath)
-
-
+logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=FilePath)
 topic_option = click.option(
     "--topic",
     "topics",
+    metavar="ROLE=/TOPIC",
     multiple=True,
     type=RoleTopic(),
-    help="ROLE=/topic where several fit, e.g. wrench=/ft; repeatable.",
+    help="Topic of a role, where several topics fit, e.g. wrench=/ft; repeatable.",
 )
+
+
+def samples_option(default: int = 1000) -> Callable[[Function], Function]:
+    """``--samples`` with its default."""
+    return click.option(
+        "--samples",
+        default=default,
+        show_default=True,
+        type=Count(2, MOST_SAMPLES),
+        help="Paths sampled from each learnt policy in each scene.",
+    )
 
 
 def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ...]]:

@@ -42,12 +42,20 @@ class RoleTopic(click.ParamType):  # type: ignore[type-arg]
 class Number(click.FloatRange):
     """A finite number within bounds: click's own takes nan, which no bound stops."""
 
+    name = "number"
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Parse and check."""
         number = float(super().convert(value, param, ctx))
         if not isfinite(number):
             self.fail(f"expected a finite number, found {value!r}", param, ctx)
         return number
+
+
+class Count(click.IntRange):
+    """A whole number within bounds."""
+
+    name = "integer"
 
 
 class Point(click.ParamType):  # type: ignore[type-arg]

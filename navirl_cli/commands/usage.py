@@ -8,6 +8,8 @@ from weakref import WeakKeyDictionary
 import click
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+#: Sections that end every help.
+_LAST = ("Output", "Help")
 #: The section of an option in its command's help.
 _SECTIONS: WeakKeyDictionary[click.Parameter, str] = WeakKeyDictionary()
 _ARGUMENT = re.compile(r"`([a-z][a-z0-9_]*)`")
@@ -52,22 +54,22 @@ class WithExamples(click.Command):
             for purpose, line in self.examples:
                 formatter.write_text(f"{purpose}:")
                 formatter.indent()
-                formatter.write(f"{'':>{formatter.current_indent}}{line}\n")  # never broken: it is to be copied
+                formatter.write_text(f"\b\n{line}")  # never broken: it is to be copied
                 formatter.dedent()
 
 
 class Command(WithExamples):
-    """A command whose help shows options in the sections that :func:`section` put them in, then the others."""
+    """A command whose help shows options in sections, as :func:`section` puts them."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each section."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for param in self.get_params(ctx):
-            if (record := param.get_help_record(ctx)) is not None:
+            if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
                 sections.setdefault(_SECTIONS.get(param, "Help"), []).append(record)
-        for title, records in sections.items():
+        for title in sorted(sections, key=lambda title: _LAST.index(title) if title in _LAST else -1):
             with formatter.section(title):
-                formatter.write_dl(records)
+                formatter.write_dl(sections[title])
 
 
 def section(title: str, *options: Callable[[Any], Any]) -> Callable[[Function], Function]:

@@ -8,8 +8,9 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, seed_option
 from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -17,19 +18,19 @@ if TYPE_CHECKING:
 _GROUP = "A group as in the tables of navirl evaluate, e.g. 'force, cycle 2'"
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("All demonstrations", "navirl plot ranks demos.json --reward reward.json -o ranks.pdf"),
+        Example("One group", "navirl plot ranks demos.json --reward reward.json --group 'force, cycle 2' -o ranks.png"),
+    ],
+)
 @page_options
 @demos_argument
-@reward_option
-@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
-@click.option(
-    "--samples",
-    default=1000,
-    show_default=True,
-    type=click.IntRange(1, 100_000),
-    help="Paths drawn from the policy, among which each demonstration ranks.",
+@section(
+    "Demonstrations", click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
 )
-@seed_option
+@section("Learnt paths", reward_option, samples_option(), seed_option)
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
     """Draw how demonstrations rank among paths of the policy.
 
@@ -51,13 +52,21 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
     page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found]), uniformity(found)[1]))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Two rewards", "navirl plot compare demos.json --reward first.json --reward second.json -o two.png"),
+        Example("Two groups", "navirl plot compare demos.json --group 'force, cycle 1' --group joystick -o two.png"),
+    ],
+)
 @page_options
 @demos_argument
-@click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more.")
-@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more.")
-@trial_option
-@crop_option
+@section(
+    "Compared",
+    click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more."),
+    click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more."),
+)
+@section("Scene", trial_option, crop_option)
 def compare(
     page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
 ) -> None:

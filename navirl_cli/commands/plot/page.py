@@ -12,7 +12,7 @@ import click
 
 from navirl_cli.commands.shared import force_option
 from navirl_cli.commands.types import Choice, FilePath
-from navirl_cli.commands.usage import Function
+from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.files import check_writable
 
@@ -97,7 +97,8 @@ def page_options(function: Function) -> Function:
         check_writable(output, force=force)
         return function(page=Page(output, wide, style, force), **others)
 
-    options = (
+    figure_options = section(
+        "Output",
         click.option("-o", "--output", type=FigurePath(), required=True, help="Figure to write: .png, .pdf or .svg."),
         click.option(
             "--wide", is_flag=True, help="Width of a page with two columns (7.16 in) instead of one column (3.5 in)."
@@ -111,9 +112,7 @@ def page_options(function: Function) -> Function:
         ),
         force_option,
     )
-    for decorate in reversed(options):
-        packed = decorate(packed)
-    return packed  # type: ignore[return-value]
+    return figure_options(packed)  # type: ignore[return-value]
 
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
