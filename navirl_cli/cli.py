@@ -1,4 +1,4 @@
-"""The command line: subcommands are loaded when called, and known trouble becomes a message here and only here."""
+"""The command line: commands are imported when called, and expected errors become messages here and only here."""
 
 import sys
 from typing import Any
@@ -7,26 +7,26 @@ import click
 
 from navirl_cli import __version__
 from navirl_cli.commands.lazy import LazyGroup
-from navirl_cli.commands.usage import as_options
+from navirl_cli.commands.usage import Example, as_options
 from navirl_cli.errors import NavirlError
 
-#: By name: what the help lists. The module navirl_cli.commands.NAME holds a command NAME (with _ for -); it is loaded
-#: when called, so that help and completion stay fast.
+#: Summaries of the commands, in the order of the work. The module navirl_cli.commands.NAME holds the command NAME, with
+#: _ for -. It is imported when the command is called, so that help and completion are fast.
 COMMANDS = {
-    "inspect": "Tell what logs hold, and what extract would make of it.",
+    "inspect": "Show what logs hold, and what extract would take from them.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
-    "evaluate": "Measure demonstrated, learnt and baseline paths, and how groups of them differ.",
+    "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
-    "report": "Tell what was learnt, in one HTML page without anything from elsewhere.",
+    "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",
-    "simulate": "Write simulated logs of people pushing a robot, with known truth.",
+    "simulate": "Simulate people who push a robot, and write logs with known truth.",
 }
 
 
 class _Root(LazyGroup):
-    """The group of all commands, and the boundary for known trouble."""
+    """The group of all commands, and the boundary for expected errors."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; expected errors and Ctrl-C become one line on stderr and an exit code."""
@@ -46,20 +46,20 @@ class _Root(LazyGroup):
     cls=_Root,
     known={name: (f"navirl_cli.commands.{name.replace('-', '_')}", summary) for name, summary in COMMANDS.items()},
     context_settings={"help_option_names": ["-h", "--help"]},
+    examples=[
+        Example("From logs to demonstrations", "navirl extract p01.mcap p02.mcap p03.mcap -o demos.json"),
+        Example("From demonstrations to a reward", "navirl fit demos.json -o reward.json"),
+        Example("Where the learnt policy leads", "navirl plot policy demos.json --reward reward.json -o policy.pdf"),
+    ],
 )
 @click.version_option(__version__, prog_name="navirl")
-@click.option("--debug", is_flag=True, help="Show the traceback of known trouble too.")
+@click.option("--debug", is_flag=True, help="Show the traceback of expected errors too.")
 def cli(debug: bool) -> None:
-    """Learn how a robot should drive around people from people pushing it.
+    """Learn how a robot should drive around people from people who push it.
 
-    \b
-    navirl extract logs/*.mcap -o demos.json
-    navirl fit demos.json -o reward.json
-    navirl evaluate demos.json --reward reward.json
-    navirl plot policy demos.json --reward reward.json -o policy.pdf
-
-    Exit codes: 0 done, 1 known trouble, 2 wrong usage, 3 done but some data was lost or skipped.
-    """  # noqa: D301 click reads the \b
+    Exit codes: 0 done; 1 error in the data or files; 2 wrong usage; 3 done, but some data was lost or skipped; 130
+    interrupted.
+    """
 
 
 def main() -> None:

@@ -200,9 +200,9 @@ def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
     ("words", "code", "message"),
     [
         (("--prior", "{}/reward.json", "--cross-validate", "participant"), 2, "--cross-validate and --prior exclude"),
-        (("--profile", "nonsense"), 1, "navirl: --profile: unknown parameter nonsense; the reward has c0, a_g, a_"),
+        (("--profile", "nonsense"), 1, "navirl: --profile: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'n"),
         (("--bootstrap", "1"), 2, "Invalid value for '--bootstrap': 1 is not in the range"),
-        (("--cross-validate", "trial"), 2, "Invalid value for '--cross-validate': 'trial' is not 'participant'"),
+        (("--cross-validate", "trial"), 2, "for '--cross-validate': expected 'participant', found 'trial'"),
         (("--method", "simplex"), 2, "Invalid value for '--method'"),
         (("--steps", "some"), 2, "Invalid value for '--steps'"),
         (("--prior", "none.json"), 1, "navirl: none.json: cannot be read"),

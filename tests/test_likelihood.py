@@ -200,7 +200,7 @@ def test_the_expected_gradient_is_zero_at_the_truth():
 
 
 def test_no_demonstration_is_nothing_to_learn_from():
-    with pytest.raises(DemonstrationError, match="no demonstration to learn from: check `condition`, `cycle`"):
+    with pytest.raises(DemonstrationError, match="no demonstration to learn from"):
         evidence_of([])
 
 

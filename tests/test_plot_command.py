@@ -76,7 +76,7 @@ def test_the_help_imports_nothing_heavy():
 
 
 def test_an_unknown_figure_is_answered_with_the_known_ones(navirl):
-    assert "No such command 'heat'; commands are paths, policy, reward" in navirl("plot", "heat", code=2).stderr
+    assert "command: expected one of 'paths', 'policy', 'reward'" in navirl("plot", "heat", code=2).stderr
 
 
 def test_a_figure_for_a_screen_has_twice_the_pixels_in_the_dark(navirl, files):
@@ -196,7 +196,7 @@ def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
     assert figure_of(*words).axes[0].get_title().startswith("n = 2, p ")
     assert figure_of(*words, "--group", "joystick").axes[0].get_title().startswith("n = 1, p ")
     message = navirl("plot", *words, "--group", "joystik", "-o", "c.svg", code=1).stderr
-    assert "no group is called 'joystik'; there are 'force, cycle 1', 'joystick'" in message
+    assert "--group: expected one of 'force, cycle 1', 'joystick', found 'joystik'; did you mean 'joystick'?" in message
 
 
 def test_two_rewards_or_two_groups_are_side_by_side(files, figure_of):
@@ -219,4 +219,4 @@ def test_what_cannot_be_compared_is_refused(navirl, files):
         assert needs in navirl(*words, *wrong, code=2).stderr
     both = ("--group", "joystick", "--group", "force, cycle 1", "--trial", "p01/1")
     assert "--trial selects the scene of --reward" in navirl(*words, *both, code=2).stderr
-    assert "no group is called 'x'" in navirl(*words, "--group", "x", "--group", "y", code=1).stderr
+    assert "found 'x'" in navirl(*words, "--group", "x", "--group", "y", code=1).stderr

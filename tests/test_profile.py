@@ -148,7 +148,7 @@ def test_progress_is_told_the_parameter_and_its_value(evidence, found):
 
 
 def test_an_unknown_parameter_is_refused(evidence, found):
-    with pytest.raises(RewardError, match=r"^`profile`: unknown parameter c9; the reward has c0, a_g, a_p, sigma_p$"):
+    with pytest.raises(RewardError, match=r"^`profile`: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c9'"):
         profile(evidence, found, "c9")
 
 

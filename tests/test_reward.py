@@ -87,7 +87,7 @@ def test_what_is_not_named_keeps_its_initial_value():
         (lambda: Reward((-50.0, 0.0, 0.0, 0.0)), r"sigma_p = 0 1/m\^2 is outside its bounds 0.001 to 1000"),
         (
             lambda: Reward.named({"a_q": 1.0, "c0": -1.0}),
-            r"unknown parameter a_q; the reward has c0, a_g, a_p, sigma_p",
+            r"^parameter: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'a_q'",
         ),
     ],
 )

@@ -56,10 +56,16 @@ def test_an_unknown_intervention_is_not_taken_for_none():
 
 
 def test_nothing_left_is_refused():
-    with pytest.raises(DemonstrationError, match="no demonstration to learn from"):
+    with pytest.raises(DemonstrationError, match=r"^`cycle`: expected one of 'cycle 1', .*found 'cycle 7'"):
         select(ALL, cycle=7)
-    with pytest.raises(DemonstrationError, match="no demonstration to learn from"):
-        select(ALL, cycle=7, steps=Steps.CONTACT)
+    with pytest.raises(
+        DemonstrationError, match=r"^`condition` and `cycle`: expected one of 'f.* found 'force, cycle 7'"
+    ):
+        select(ALL, conditions=["force"], cycle=7, steps=Steps.CONTACT)
+    with pytest.raises(DemonstrationError, match=r"^`only_corrected`: the person intervened in none of the demonstr"):
+        select([LEFT_ALONE], only_corrected=True)
+    with pytest.raises(DemonstrationError, match=r"^no demonstration to learn from"):
+        select([])
     with pytest.raises(DemonstrationError, match=r"^`steps` contact: none of the demonstrations holds a contact"):
         select([LEFT_ALONE], steps=Steps.CONTACT)
 

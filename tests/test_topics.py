@@ -7,7 +7,7 @@ import pytest
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import scan
-from navirl_cli.logs.roles.topics import Topic, choose, refusal, topics_of
+from navirl_cli.logs.roles.topics import ROLES, Topic, choose, refusal, short_name, topics_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -192,20 +192,24 @@ def test_equal_candidates_are_the_users_choice(pick, topics, role, types):
     assert ([topic.name for topic in chosen.topics], chosen.reason) == ([second], "named by `topic`")
 
 
+MAPS = ", ".join(repr(name) for name, type_name in NAV2.items() if type_name == GRID)
+
+
 @pytest.mark.parametrize(
     ("chosen", "message"),
     [
         (
             {"wheel": ("/odom",)},
-            "`topic`: no role is called wheel; roles are wrench, odometry, map, people, goal, joystick, tf, tf_static",
+            f"`topic`: expected one of {', '.join(repr(role.name) for role in ROLES)}, found 'wheel'",
         ),
         (
             {"tf": ("/odom",)},
-            "run.mcap: `topic` tf=/odom: expected tf2_msgs/TFMessage, found nav_msgs/Odometry",
+            "run.mcap: `topic` tf: expected a topic of type tf2_msgs/TFMessage, found '/odom' of type "
+            + short_name(ODOMETRY),
         ),
         (
             {"map": ("/maps",)},
-            "run.mcap: `topic` map=/maps: expected nav_msgs/OccupancyGrid, found no such topic",
+            f"run.mcap: `topic` map: expected one of {MAPS}, found '/maps'; did you mean '/map'?",
         ),
         (
             {"map": ("/map", "/local_costmap/costmap")},

@@ -5,11 +5,15 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from command_line import option_names
 
 import navirl_cli
+from navirl_cli.cli import cli
 from navirl_cli.commands.usage import as_options
+from navirl_cli.errors import nearest, unknown
 
+SAMPLES = Path(__file__).parent.parent / "sample_logs"
 PACKAGE = Path(navirl_cli.__file__).parent
 #: Rooms whose messages still name options.
 PENDING = {"artefacts", "evaluation", "reports"}
@@ -17,10 +21,22 @@ PENDING = {"artefacts", "evaluation", "reports"}
 OTHER_TOOLS = re.compile(r"rosbags-convert|zstd ")
 
 
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    """Demonstrations and a reward of one sample log."""
+    folder = tmp_path_factory.mktemp("work")
+    for words in (
+        ["extract", SAMPLES / "p01.mcap", "-o", folder / "demos.json"],
+        ["fit", folder / "demos.json", "--condition", "force", "--cycle", "2", "-o", folder / "reward.json"],
+    ):
+        assert CliRunner().invoke(cli, [str(word) for word in words]).exit_code == 0
+    return folder
+
+
 def files_below_the_commands():
     for path in sorted(PACKAGE.rglob("*.py")):
         room = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        if room not in {"cli", "commands"}:
+        if room not in {"api", "cli", "commands"}:  # what is called from Python names its own arguments
             yield room, path
 
 
@@ -85,3 +101,69 @@ def test_errors_notes_and_results_pass_the_boundary(navirl, monkeypatch):
 
     monkeypatch.setattr(inspect, "sources_of", refuse)
     assert navirl("inspect", "run.mcap", code=1).stderr == "navirl: run.mcap: no map; give it with --map\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("p1/3", ["p01/3", "p01/1"]),
+        ("P01/1", ["p01/1", "p01/3"]),
+        ("force", ["force, cycle 1"]),
+        ("LENGTH_M", ["length_m"]),
+        ("nothing like it", []),
+        ("", []),
+    ],
+)
+def test_names_that_are_spelled_alike_or_hold_a_name_are_near(name, near):
+    assert nearest(name, ["p01/1", "p01/3", "force, cycle 1", "length_m"]) == near
+
+
+@pytest.mark.parametrize(
+    ("what", "name", "known", "message"),
+    [
+        (
+            "`trial`",
+            "p2",
+            ["p01", "p02"],
+            "`trial`: expected one of 'p01', 'p02', found 'p2'; did you mean 'p02'?",
+        ),
+        ("", "x", ["force"], "expected 'force', found 'x'"),
+        ("group", "x", [], "group: expected nothing, found 'x'"),
+        (
+            "n",
+            "x",
+            map(str, range(22)),
+            f"n: expected one of {', '.join(map(repr, map(str, range(20))))}, 2 more, found 'x'",
+        ),
+    ],
+)
+def test_what_a_message_says_of_an_unknown_name(what, name, known, message):
+    assert unknown(what, name, known) == message
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "near"),
+    [
+        (["extrakt"], 2, "'extract'"),
+        (["plot", "polcy"], 2, "'policy'"),
+        (["extract", "p.mcap", "--spilt", "goal"], 2, ""),
+        (["extract", "p.mcap", "-o", "x.json", "--split", "gaol"], 2, "'goal'"),
+        (["extract", "p.mcap", "-o", "x.json", "--topic", "wrensh=/ft"], 2, "'wrench'"),
+        (["extract", SAMPLES / "p01.mcap", "-o", "x.json", "--topic", "wrench=/wrensh"], 1, "'/wrench'"),
+        (["fit", "{}/demos.json", "-o", "x.json", "--condition", "forse"], 2, "'force'"),
+        (["fit", "{}/demos.json", "-o", "x.json", "--cycle", "3"], 1, "'cycle 2' or 'cycle 1'"),
+        (["fit", "{}/demos.json", "-o", "x.json", "--profile", "sigma"], 1, "'sigma_p'"),
+        (["fit", "{}/demos.json", "-o", "x.json", "--init", "sigma=2"], 2, "'sigma_p'"),
+        (["evaluate", "{}/demos.json", "--metrics", "lenght_m"], 2, "'length_m'"),
+        (["evaluate", "{}/demos.json", "--by", "conditions"], 2, "'condition'"),
+        (["evaluate", "{}/demos.json", "--pair", "force", "joystick"], 1, "'force, cycle 1' or 'force, cycle 2'"),
+        (["plot", "forces", "{}/demos.json", "-o", "x.png", "--trial", "p1/3"], 1, "'p01/3'"),
+        (["plot", "compare", "{}/demos.json", "-o", "x.png", "--group", "joystik", "--group", "x"], 1, "'joystick'"),
+    ],
+)
+def test_near_names_are_proposed(navirl, work, words, code, near):
+    message = " ".join(navirl(*(str(word).format(work) for word in words), code=code).stderr.split())
+    assert f"did you mean {near}" in message.replace("Did you mean --split", "did you mean '--split'").replace(
+        "Did", "did"
+    )
+    assert not list(Path().iterdir())

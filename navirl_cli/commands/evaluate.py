@@ -10,8 +10,6 @@ from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
     demonstrations_in,
     demos_argument,
     echo,
@@ -21,13 +19,16 @@ from navirl_cli.commands.shared import (
     json_option,
     output_option,
     progress_bar,
+    samples_option,
     seed_option,
 )
+from navirl_cli.commands.types import Choice, FilePath, Number
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import ENDINGS, Format, written
-from navirl_cli.errors import ArtefactError, DemonstrationError
+from navirl_cli.errors import ArtefactError, DemonstrationError, unknown
 from navirl_cli.evaluation.compare import compare
-from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import FIELDS
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
@@ -37,10 +38,10 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table
 
 
-class Names(click.ParamType):  # type: ignore[type-arg]
-    """Metrics by name, parted by commas; or all."""
+class Metrics(click.ParamType):  # type: ignore[type-arg]
+    """Comma-separated names of metrics, or all."""
 
-    name = "names"
+    name = "name,..."
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Metric, ...]:
         """Look the names up."""
@@ -49,8 +50,9 @@ class Names(click.ParamType):  # type: ignore[type-arg]
         if value == "all":
             return tuple(BY_NAME.values())
         names = [name.strip() for name in value.split(",")]
-        if unknown := [name for name in names if name not in BY_NAME]:
-            self.fail(f"unknown metric {unknown[0]!r}; navirl evaluate --list-metrics lists them", param, ctx)
+        for name in names:
+            if name not in BY_NAME:
+                self.fail(f"{unknown('', name, BY_NAME)}; --list-metrics lists all", param, ctx)
         return tuple(BY_NAME[name] for name in dict.fromkeys(names))
 
 
@@ -61,69 +63,88 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
         ctx.exit()
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Driven, learnt and baseline paths", "navirl evaluate demos.json --reward reward.json"),
+        Example(
+            "Two metrics of two groups, compared by participant",
+            "navirl evaluate demos.json --metrics length_m,area_m2 --pair 'force, cycle 2' joystick",
+        ),
+        Example("A table for a paper", "navirl evaluate demos.json --reward reward.json --samples 100 -o metrics.tex"),
+    ],
+)
 @demos_argument
-@click.option(
-    "--reward",
-    "rewards",
-    multiple=True,
-    type=FilePath,
-    help="Learnt reward, to measure the paths that its policy takes; repeatable, side by side in one table.",
+@section(
+    "Metrics",
+    click.option(
+        "--metrics",
+        default=PAPER_METRICS,
+        type=Metrics(),
+        help="Comma-separated names of metrics, or all.  [default: length_m,min_distance_m,area_m2]",
+    ),
+    click.option(
+        "--list-metrics",
+        is_flag=True,
+        is_eager=True,
+        expose_value=False,
+        callback=_list_metrics,
+        help="List all metrics with unit, definition and source, and exit.",
+    ),
+    click.option(
+        "--by",
+        "fields",
+        multiple=True,
+        type=Choice(list(FIELDS)),
+        help="Group by this; repeatable.  [default: condition, cycle and set]",
+    ),
 )
-@click.option(
-    "--metrics",
-    default=PAPER_METRICS,
-    type=Names(),
-    help="Names parted by commas, or all.  [default: length_m,min_distance_m,area_m2]",
+@section(
+    "Learnt paths",
+    click.option(
+        "--reward",
+        "rewards",
+        multiple=True,
+        type=FilePath,
+        help="Learnt reward, to measure the paths of its policy too; repeatable.",
+    ),
+    samples_option(),
+    click.option(
+        "--precision",
+        type=Number(1e-3, 1),
+        help="Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard "
+        "deviation.",
+    ),
+    seed_option,
 )
-@click.option(
-    "--list-metrics",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_list_metrics,
-    help="List all metrics with unit, definition and source.",
+@section(
+    "Comparisons",
+    click.option(
+        "--pair",
+        "pairs",
+        multiple=True,
+        nargs=2,
+        metavar="GROUP OTHER",
+        help="Compare the driven paths of two groups by participant; repeatable.",
+    ),
+    click.option(
+        "--ranks", is_flag=True, help="Rank each demonstration by likelihood among paths sampled from the policy."
+    ),
 )
-@click.option(
-    "--by",
-    "fields",
-    multiple=True,
-    type=click.Choice(list(FIELDS)),
-    help="Group by this; repeatable.  [default: condition, cycle and set]",
+@section(
+    "Output",
+    click.option(
+        "--format",
+        "style",
+        type=Choice([how.value for how in Format]),
+        default=Format.TEXT.value,
+        show_default=True,
+        help="Format of the printed tables.",
+    ),
+    output_option("File to write as well: .json, .csv, .md or .tex.", required=False),
+    json_option,
+    force_option,
 )
-@click.option(
-    "--pair",
-    "pairs",
-    multiple=True,
-    nargs=2,
-    metavar="GROUP OTHER",
-    help="Compare the driven paths of two groups by participant; repeatable.",
-)
-@click.option("--ranks", is_flag=True, help="Rank demonstrations among the policy's paths: are they typical of it?")
-@click.option(
-    "--samples",
-    default=1000,
-    show_default=True,
-    type=click.IntRange(2, MOST),
-    help="Paths drawn from a learnt policy in each scene.",
-)
-@click.option(
-    "--precision",
-    type=Number(1e-3, 1),
-    help="Draw until the Monte Carlo error of each expected value is below this share of it, or of its spread.",
-)
-@seed_option
-@click.option(
-    "--format",
-    "style",
-    type=click.Choice([how.value for how in Format]),
-    default=Format.TEXT.value,
-    show_default=True,
-    help="How to print.",
-)
-@json_option
-@output_option("Write the results too: .json, .csv, .md or .tex.", required=False)
-@force_option
 def evaluate(
     demos: Path,
     rewards: tuple[Path, ...],
@@ -139,11 +160,11 @@ def evaluate(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Measure demonstrated, learnt and baseline paths, and how groups of them differ.
+    """Measure demonstrated, learnt and baseline paths, and compare groups of them.
 
-    Mean and standard deviation by group of every metric asked for: of driven paths over demonstrations, of learnt
-    paths over the policy. Distances are from the robot's shell to people's centres. What visits of the policy give
-    exactly (length, heading change, way in zones) is exact; the rest are means over drawn paths.
+    Each metric has a mean and a standard deviation by group: over demonstrations for driven paths, over the policy for
+    learnt paths. Distances are from the robot's shell to people's centres. Expected visits of the policy give exact
+    means of path length, heading change and path length in zones; the other means are over sampled paths.
     """
     import numpy as np
 

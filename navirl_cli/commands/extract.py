@@ -9,21 +9,21 @@ import click
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
-    Point,
     bytes_bar,
     echo,
     echo_json,
     finish,
     force_option,
     json_option,
+    logs_argument,
     merged,
     output_option,
     say,
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.types import Choice, FilePath, Number, Point
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.rasterize import Rule
@@ -38,70 +38,87 @@ from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.reports.extraction import gain_table, published_notes, trial_table
 
 
-@click.command()
-@click.argument("logs", nargs=-1, required=True, type=FilePath)
-@output_option("Demonstrations file to write.")
-@click.option(
-    "--split",
-    type=click.Choice([split.value for split in Split]),
-    default=Split.GOAL.value,
-    show_default=True,
-    help="Trials start at new goals, at rests, or the log is one trial.",
+@click.command(
+    cls=Command,
+    examples=[
+        Example("A trial for each goal that the logs announce", "navirl extract p01.mcap p02.mcap -o demos.json"),
+        Example("All logs of a folder, with a named topic", "navirl extract logs --topic wrench=/wrench -o demos.json"),
+        Example("Larger cells, and the robot's gain", "navirl extract p01.mcap --resolution 0.2 --gain -o demos.json"),
+    ],
 )
-@click.option("--participant", help="Name in place of the log's or the file's.")
-@click.option(
-    "--robot-radius", type=Number(0, 10), help="m; grows the map.  [default: the log's session record's, else 0.3]"
+@logs_argument
+@section(
+    "Input",
+    topic_option,
+    click.option(
+        "--map", "map_file", type=FilePath, help="Nav2 map YAML beside its pgm or png, instead of the map in the log."
+    ),
+    click.option("--frame", help="Frame of all results, instead of the map's frame."),
+    click.option(
+        "--no-wrench", is_flag=True, help="Ignore forces; also for logs without a wrench. Contact is then unknown."
+    ),
+    click.option("--wrench-frame", help="Frame of the wrench, instead of the frame in its header."),
+    click.option(
+        "--time",
+        "time_source",
+        type=Choice([source.value for source in TimeSource]),
+        default=TimeSource.HEADER.value,
+        show_default=True,
+        help="Time of a message: the stamp in its header, or the time of receipt in the log.",
+    ),
+    click.option("--join", is_flag=True, help="Treat all LOGs as parts of one recording."),
+    click.option("--strict", is_flag=True, help="Refuse damaged logs."),
 )
-@click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m.")
-@click.option(
-    "--rasterizer",
-    type=click.Choice([rule.value for rule in Rule]),
-    default=ExtractSettings.rasterizer.value,
-    show_default=True,
-    help="How a path becomes cells: the study's rule, the cells crossed, or the chain code.",
+@section(
+    "Trials",
+    click.option(
+        "--split",
+        type=Choice([split.value for split in Split]),
+        default=Split.GOAL.value,
+        show_default=True,
+        help="Start a trial at every new goal or after every stop, or take the log as one trial.",
+    ),
+    click.option("--goal", type=Point(), help="Goal in the map frame, m, instead of the goals in the log."),
+    click.option(
+        "--person", "people", multiple=True, type=Point(), help="Position of a person in the map frame, m; repeatable."
+    ),
+    click.option("--participant", help="Participant, instead of the name in the log or of the file."),
 )
-@click.option(
-    "--person", "people", multiple=True, type=Point(), help="Where a person stands, m in the map; repeatable."
+@section(
+    "Contacts",
+    click.option(
+        "--contact-force",
+        default=3.0,
+        show_default=True,
+        type=Number(0, 1000, min_open=True),
+        help="A contact begins above this force and ends below half of it, N.",
+    ),
+    click.option(
+        "--wrench-filter",
+        default=CUTOFF_HZ,
+        show_default=True,
+        type=Number(0.01, 1000),
+        help="Cut-off frequency of the force's low-pass filter, Hz.",
+    ),
+    click.option("--gain", is_flag=True, help="Estimate the robot's gain, its velocity per sideways force."),
 )
-@click.option("--goal", type=Point(), help="The goal, m in the map, in place of the log's goals.")
-@click.option(
-    "--contact-force",
-    default=3.0,
-    show_default=True,
-    type=Number(0, 1000, min_open=True),
-    help="A contact begins above this force, N, and ends below half of it.",
+@section(
+    "Grid",
+    click.option("--resolution", default=0.1, show_default=True, type=Number(0.01, 2), help="Side of the cells, m."),
+    click.option(
+        "--rasterizer",
+        type=Choice([rule.value for rule in Rule]),
+        default=ExtractSettings.rasterizer.value,
+        show_default=True,
+        help="Cells of a path: by the rule of the paper's study, the cells crossed, or the chain code.",
+    ),
+    click.option(
+        "--robot-radius",
+        type=Number(0, 10),
+        help="Radius by which the map is inflated, m.  [default: from the log's session record, else 0.3]",
+    ),
 )
-@click.option(
-    "--wrench-filter",
-    default=CUTOFF_HZ,
-    show_default=True,
-    type=Number(0.01, 1000),
-    help="The force is low-passed below this frequency, Hz.",
-)
-@click.option(
-    "--gain",
-    is_flag=True,
-    help="Estimate how fast the robot gives way to a push to the side; with --json the trials go under trials.",
-)
-@topic_option
-@click.option(
-    "--map", "map_file", type=FilePath, help="Map in place of the log's: a Nav2 map YAML beside its pgm or png."
-)
-@click.option("--frame", help="Frame that everything is brought into, in place of the map's.")
-@click.option("--no-wrench", is_flag=True, help="Leave forces out, or do without them: contact is then unknown.")
-@click.option("--wrench-frame", help="Frame that the wrench is given in, in place of its header's.")
-@click.option(
-    "--time",
-    "time_source",
-    type=click.Choice([source.value for source in TimeSource]),
-    default=TimeSource.HEADER.value,
-    show_default=True,
-    help="When a message was measured: its header's stamp, or when the recorder got it.",
-)
-@click.option("--join", is_flag=True, help="Take all LOGs as pieces of one recording.")
-@click.option("--strict", is_flag=True, help="Refuse a log of which something is lost.")
-@json_option
-@force_option
+@section("Output", output_option("Demonstrations file to write."), json_option, force_option)
 def extract(
     logs: tuple[Path, ...],
     output: Path,
@@ -128,15 +145,16 @@ def extract(
 ) -> None:
     """Turn MCAP logs into demonstrations.
 
-    LOG is an MCAP file (also one compressed as a whole with zstd or lz4), a rosbag2 folder, a folder of recordings, or
-    a pattern. Finds wrench, odometry, map, people, goals, joystick and tf by message type (navirl inspect shows what
-    it would take), splits each log into trials, finds the intervals in which a person pushes, and puts each trial's
-    path on the grid. The map should be the one in which the robot drove; a plain map is grown by the robot's radius, a
-    costmap taken as it is.
+    LOG is an MCAP file, also one that is compressed with zstd or lz4; a rosbag2 folder; a folder of recordings; or a
+    pattern. Topics are found by message type; navirl inspect shows which. Each log is split into trials. In each trial
+    the contacts are detected, in which a person pushes the robot, and the path becomes cells of a grid.
 
-    Of the wrench only the force is used, less the sensor's slowly changing bias and turned into the robot's base frame.
-    A force does not depend on where the sensor sits; the torque does, by the lever arm, and is not used. A push on the
-    robot's body that does not pass through the sensor is not seen.
+    The map should be the one in which the robot drove. A plain map is inflated by the robot's radius; a costmap is
+    inflated already.
+
+    Only the force of the wrench is used, without the sensor's slowly changing bias and in the robot's base frame. A
+    force does not depend on where the sensor is mounted; a torque does, by the lever arm. A push on the robot's body
+    that does not pass through the sensor is not measured.
     """
     if no_wrench and (gain or wrench_frame):
         raise click.UsageError("--no-wrench leaves nothing to --gain and --wrench-frame.")

@@ -8,8 +8,6 @@ import click
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
-    Number,
     demonstrations_in,
     demos_argument,
     echo,
@@ -22,7 +20,8 @@ from navirl_cli.commands.shared import (
     say,
     seed_option,
 )
-from navirl_cli.commands.usage import as_options
+from navirl_cli.commands.types import Choice, Count, FilePath, Number
+from navirl_cli.commands.usage import Command, Example, as_options, section
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
@@ -36,75 +35,94 @@ from navirl_cli.irl.selection import Steps, select
 from navirl_cli.reports.fit import remarks, report, warnings
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("One condition and cycle", "navirl fit demos.json --condition force --cycle 2 -o reward.json"),
+        Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
+        Example("A profile likelihood", "navirl fit demos.json --cycle 2 --profile sigma_p -o reward.json"),
+    ],
+)
 @demos_argument
-@output_option("Reward file to write.")
-@click.option(
-    "--init",
-    "initial",
-    default="",
-    help="Start: an earlier reward file, or parameters as c0=-50,a_g=-0.01,a_p=-5,sigma_p=2.",
+@section(
+    "Demonstrations",
+    click.option(
+        "--condition",
+        "conditions",
+        multiple=True,
+        type=Choice([condition.value for condition in Condition]),
+        help="Use trials of this condition only; repeatable.",
+    ),
+    click.option("--cycle", type=int, help="Use trials of this cycle only."),
+    click.option("--only-corrected", is_flag=True, help="Use only trials in which the person intervened."),
+    click.option(
+        "--steps",
+        type=Choice([steps.value for steps in Steps]),
+        default=Steps.ALL.value,
+        show_default=True,
+        help="Use all steps of a path, or only those during contact.",
+    ),
 )
-@click.option(
-    "--prior",
-    "prior_file",
-    type=FilePath,
-    help="Earlier reward file, taken as a Gaussian prior with its mean and covariance; the start too without --init.",
+@section(
+    "Estimation",
+    click.option(
+        "--init",
+        "initial",
+        default="",
+        metavar="FILE|NAME=VALUE,...",
+        help="Initial values: a reward file, or parameters as c0=-50,a_g=-0.01,a_p=-5,sigma_p=2.",
+    ),
+    click.option(
+        "--prior",
+        "prior_file",
+        type=FilePath,
+        help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init also the initial "
+        "values.",
+    ),
+    click.option(
+        "--l2",
+        default=PAPER_L2,
+        show_default=True,
+        type=Number(0, 1e6),
+        help="Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, "
+        "without the parameters that --prior determines; 0 for none.",
+    ),
+    click.option(
+        "--method",
+        type=Choice([method.value for method in Method]),
+        default=Method.NEWTON.value,
+        show_default=True,
+        help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam); both with exact gradients.",
+    ),
+    click.option(
+        "--correct-bias",
+        is_flag=True,
+        help="Subtract the first-order bias of maximum likelihood, which few demonstrations make large for a_p.",
+    ),
 )
-@click.option(
-    "--l2",
-    default=PAPER_L2,
-    show_default=True,
-    type=Number(0, 1e6),
-    help="Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, but for those that a "
-    "--prior knows. 0 for none.",
+@section(
+    "Uncertainty",
+    click.option(
+        "--bootstrap",
+        type=Count(2, 100_000),
+        metavar="N",
+        help="Fit N times to participants drawn with replacement.",
+    ),
+    click.option(
+        "--profile",
+        "profiles",
+        multiple=True,
+        metavar="NAME",
+        help="Profile likelihood of this parameter with its 95 % interval, e.g. sigma_p; repeatable.",
+    ),
+    click.option(
+        "--cross-validate",
+        type=Choice(["participant"]),
+        help="Predict each participant from the others, and compare with simpler models.",
+    ),
+    seed_option,
 )
-@click.option(
-    "--method",
-    type=click.Choice([method.value for method in Method]),
-    default=Method.NEWTON.value,
-    show_default=True,
-    help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam) on the same exact gradient.",
-)
-@click.option(
-    "--condition",
-    "conditions",
-    multiple=True,
-    type=click.Choice([condition.value for condition in Condition]),
-    help="Learn from these trials only; repeatable.",
-)
-@click.option("--cycle", type=int, help="Learn from the trials of this cycle only.")
-@click.option("--only-corrected", is_flag=True, help="Learn from trials in which the person intervened only.")
-@click.option(
-    "--steps",
-    type=click.Choice([steps.value for steps in Steps]),
-    default=Steps.ALL.value,
-    show_default=True,
-    help="Learn from all steps of a path, or from those during contact only.",
-)
-@click.option(
-    "--correct-bias",
-    is_flag=True,
-    help="Take off the first-order bias that maximum likelihood has with few demonstrations (it exaggerates a_p).",
-)
-@click.option(
-    "--bootstrap", type=click.IntRange(2, 100_000), metavar="N", help="Fit N times with participants drawn anew."
-)
-@click.option(
-    "--profile",
-    "profiles",
-    multiple=True,
-    metavar="NAME",
-    help="Follow the profile likelihood of this parameter, e.g. sigma_p, to its 95 % interval; repeatable.",
-)
-@click.option(
-    "--cross-validate",
-    type=click.Choice(["participant"]),
-    help="Foretell each participant from the others, against simpler models.",
-)
-@seed_option
-@json_option
-@force_option
+@section("Output", output_option("Reward file to write."), json_option, force_option)
 def fit(
     demos: Path,
     output: Path,
@@ -126,8 +144,9 @@ def fit(
 ) -> None:
     """Learn a navigation reward from demonstrations.
 
-    Maximum-entropy inverse reinforcement learning, exact: soft values, visits and derivatives come from linear systems,
-    the optimum from a trust-region Newton method from two starts, standard errors from the observed information.
+    Exact maximum-entropy inverse reinforcement learning. Linear systems give soft values, expected visits and
+    derivatives; a trust-region Newton method from two starts gives the maximum; the observed information gives
+    standard errors.
     """
     check_writable(output, force=force)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]

@@ -6,16 +6,9 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.commands.shared import (
-    FilePath,
-    echo_json,
-    finish,
-    force_option,
-    json_option,
-    output_option,
-    progress_bar,
-    say,
-)
+from navirl_cli.commands.shared import echo_json, finish, force_option, json_option, output_option, progress_bar, say
+from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import check_writable, new_folder
@@ -35,18 +28,28 @@ class _Imported:
     size_bytes: int = 0
 
 
-@click.command("import-study")
+@click.command(
+    "import-study",
+    cls=Command,
+    examples=[
+        Example("The published archive", "navirl import-study runs.tar.gz -o logs"),
+        Example("For a program", "navirl import-study runs.tar.gz -o logs --json"),
+    ],
+)
 @click.argument("runs", type=FilePath)
-@output_option("Folder for the logs, one a participant; made where it is missing.")
-@force_option
-@json_option
+@section(
+    "Output",
+    output_option("Folder of the logs; created if it does not exist."),
+    json_option,
+    force_option,
+)
 def import_study(runs: Path, output: Path, force: bool, as_json: bool) -> None:
     """Turn the published user study (RUNS) into logs.
 
-    RUNS is the archive runs.tar.gz that the paper's authors publish, the folder into which it was unpacked, or one
-    participant's folder. The logs are what a robot would have recorded, but that the study has neither times nor
-    forces: positions are laid out at 0.4 m/s, and extract wants --no-wrench. The published cells stand in the metadata
-    record navirl.published. The study's pickles are read as data; nothing in them is run.
+    RUNS is the archive runs.tar.gz that the paper's authors publish, the folder into which it was unpacked, or the
+    folder of one participant. The study has neither times nor forces: positions are laid out at 0.4 m/s, and extract
+    needs --no-wrench. Otherwise the logs are what a robot would have recorded. The metadata record navirl.published
+    holds the published cells. The study's pickles are parsed as data and never executed.
     """
     found, lost = runs_in(runs)
     jobs = [(number, run, output / f"{run.name}.mcap") for number, run in enumerate(found)]

@@ -5,16 +5,17 @@ from pathlib import Path
 import click
 
 from navirl_cli.commands.shared import (
-    FilePath,
     bytes_bar,
     echo,
     echo_json,
     finish,
     json_option,
+    logs_argument,
     say,
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import LogError
 from navirl_cli.logs.overview import overview
@@ -22,19 +23,31 @@ from navirl_cli.logs.sources import sources_of
 from navirl_cli.reports.overview import overview_document, overview_report
 
 
-@click.command()
-@click.argument("logs", nargs=-1, required=True, type=FilePath)
-@topic_option
-@click.option("--check", is_flag=True, help="Read every message: damage inside of chunks shows only then.")
-@json_option
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Topics of a log, and the topics that extract would take", "navirl inspect p01.mcap"),
+        Example("All logs of a folder, with a check of every message", "navirl inspect logs --check"),
+        Example("For a program", "navirl inspect p01.mcap --topic wrench=/wrench --json"),
+    ],
+)
+@logs_argument
+@section(
+    "Input",
+    topic_option,
+    click.option("--check", is_flag=True, help="Read every message, which also finds damage inside of chunks."),
+)
+@section("Output", json_option)
 def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: bool, as_json: bool) -> None:
-    """Tell what logs hold, and what extract would make of it.
+    """Show what logs hold, and what extract would take from them.
 
-    LOG is an MCAP file, a bag folder, a folder of recordings, or a pattern. Duration, clocks, damage, and every topic
-    with its type, number of messages, rate and silences; then the topics that extract would take, and what is missing
-    and how to supply it. A silence is a pause of a regular topic, five times as long as usual and half a second at
-    least; the rate leaves silences out. The stamp lead is a header's stamp less its receipt, against the odometry's:
-    near 0 on one clock; tf is often stamped a second ahead on purpose.
+    LOG is an MCAP file, a rosbag2 folder, a folder of recordings, or a pattern. The output lists duration, clocks and
+    damage; for every topic its type, number of messages, rate and gaps; the topics that extract would take; and what
+    is missing, with the option that supplies it.
+
+    A gap is a pause in a regular topic of at least half a second and five periods; rates leave gaps out. The stamp
+    lead is the header's stamp minus the time of receipt, relative to the odometry. It is near 0 for topics of the same
+    clock; tf is often stamped ahead on purpose.
     """
     refused: list[LogError] = []
     views = []

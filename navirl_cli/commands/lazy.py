@@ -6,8 +6,11 @@ from typing import Any
 
 import click
 
+from navirl_cli.commands.usage import WithExamples
+from navirl_cli.errors import unknown
 
-class LazyGroup(click.Group):
+
+class LazyGroup(WithExamples, click.Group):
     """A group that imports a command when it is called.
 
     Args:
@@ -33,9 +36,9 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """List the commands where a name is unknown."""
-        if args and args[0] not in self.known and not args[0].startswith("-"):
-            ctx.fail(f"No such command {args[0]!r}; commands are {', '.join(self.known)}.")
+        """List the commands where a name is unknown, and propose the near ones."""
+        if args and args[0] not in self.known and not args[0].startswith("-") and not ctx.resilient_parsing:
+            ctx.fail(unknown("command", args[0], self.known))
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002

@@ -8,39 +8,39 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.shared import (
-    FilePath,
     demonstrations_in,
     demos_argument,
     finish,
     force_option,
     output_option,
     progress_bar,
+    samples_option,
     seed_option,
 )
+from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.errors import ArtefactError
-from navirl_cli.evaluation.drawn import MOST, Precision
+from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.files import Input, check_writable, replacing
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("A page to send to a colleague", "navirl report demos.json reward.json -o report.html"),
+        Example("A quick look", "navirl report demos.json reward.json --samples 50 -o report.html --force"),
+    ],
+)
 @demos_argument
 @click.argument("reward", type=FilePath)
-@output_option("Page to write: .html.")
-@click.option(
-    "--samples",
-    default=1000,
-    show_default=True,
-    type=click.IntRange(2, MOST),
-    help="Paths drawn from the learnt policy in each scene.",
-)
-@seed_option
-@force_option
+@section("Learnt paths", samples_option(), seed_option)
+@section("Output", output_option("Page to write: .html."), force_option)
 def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
-    """Tell what was learnt, in one HTML page without anything from elsewhere.
+    """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
-    Parameters with intervals and what they mean in metres, warnings, metrics of driven and learnt paths, how typical
-    the demonstrations are of the policy, figures, trials, and what everything was made from. Light and dark, for
-    screens, phones and paper; tables sort by a click, figures open large.
+    The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
+    paths, how typical the demonstrations are of the policy, figures, trials, and the files with their hashes. It has a
+    light and a dark style, for screens, phones and paper; tables can be sorted, figures enlarged.
     """
     import numpy as np
 

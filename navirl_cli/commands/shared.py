@@ -4,51 +4,46 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
-from navirl_cli.commands.usage import as_options
+from navirl_cli.commands.types import Count, FilePath, RoleTopic
+from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
 
-Function = TypeVar("Function", bound=Callable[..., Any])
-FilePath = click.Path(path_type=Path)
+#: As :data:`navirl_cli.evaluation.drawn.MOST`, which is not imported before paths are sampled.
+MOST_SAMPLES = 100_000
 
 force_option = click.option("--force", is_flag=True, help="Replace existing files.")
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON in place of the table.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 seed_option = click.option(
-    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of everything drawn by chance."
-)
-samples_option = click.option(
-    "--samples",
-    default=100,
-    show_default=True,
-    type=click.IntRange(1, 100_000),
-    help="Paths drawn from the learnt policy for every demonstration.",
+    "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
 demos_argument = click.argument("demos", type=FilePath)
-
-
-class Pair(click.ParamType):  # type: ignore[type-arg]
-    """``NAME=VALUE``."""
-
-    name = "name=value"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
-        """Split at the first equals sign."""
-        name, equals, rest = str(value).partition("=")
-        if not (name and equals and rest):
-            self.fail(f"expected NAME=VALUE, found {value!r}", param, ctx)
-        return name, rest
-
-
+logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=FilePath)
 topic_option = click.option(
-    "--topic", "topics", multiple=True, type=Pair(), help="ROLE=/topic where several fit, e.g. wrench=/ft; repeatable."
+    "--topic",
+    "topics",
+    metavar="ROLE=/TOPIC",
+    multiple=True,
+    type=RoleTopic(),
+    help="Topic of a role, where several topics fit, e.g. wrench=/ft; repeatable.",
 )
+
+
+def samples_option(default: int = 1000) -> Callable[[Function], Function]:
+    """``--samples`` with its default."""
+    return click.option(
+        "--samples",
+        default=default,
+        show_default=True,
+        type=Count(2, MOST_SAMPLES),
+        help="Paths sampled from each learnt policy in each scene.",
+    )
 
 
 def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ...]]:
@@ -75,33 +70,6 @@ def demonstrations_in(path: Path) -> list[Demonstration]:
 def output_option(what: str, *, required: bool = True) -> Callable[[Function], Function]:
     """``-o/--output`` with its help."""
     return click.option("-o", "--output", type=FilePath, required=required, help=what)
-
-
-class Number(click.FloatRange):
-    """A finite number within bounds: click's own takes nan, which no bound stops."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Parse and check."""
-        number = float(super().convert(value, param, ctx))
-        if not isfinite(number):
-            self.fail(f"expected a finite number, found {value!r}", param, ctx)
-        return number
-
-
-class Point(click.ParamType):  # type: ignore[type-arg]
-    """A point as ``x,y`` in m."""
-
-    name = "x,y"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
-        """Parse two numbers."""
-        try:
-            x, y = (float(part) for part in str(value).split(","))
-        except ValueError:
-            self.fail(f"expected two numbers of metres as x,y, found {value!r}", param, ctx)
-        if not (isfinite(x) and isfinite(y)):
-            self.fail(f"expected finite numbers, found {value!r}", param, ctx)
-        return x, y
 
 
 def echo_json(document: Any) -> None:

@@ -6,22 +6,33 @@ from pathlib import Path
 import click
 
 from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option
+from navirl_cli.commands.types import Count
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.tables import Cell, Column, Table, written
 from navirl_cli.files import check_writable, new_folder
 from navirl_cli.parallel import map_in_order
 
 
-@click.command()
-@output_option("Folder for the logs, one a participant; made where it is missing.")
-@click.option("--participants", default=3, show_default=True, type=click.IntRange(1, 99), help="How many.")
-@seed_option
-@force_option
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Logs of three participants", "navirl simulate -o simulated"),
+        Example("Another participant with other random numbers", "navirl simulate --participants 1 --seed 7 -o other"),
+    ],
+)
+@section(
+    "Simulation",
+    click.option("--participants", default=3, show_default=True, type=Count(1, 99), help="Number of participants."),
+    seed_option,
+)
+@section("Output", output_option("Folder of the logs; created if it does not exist."), force_option)
 def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
-    """Write simulated logs of people pushing a robot, with known truth.
+    """Simulate people who push a robot, and write logs with known truth.
 
-    Each participant has a reward of their own, drawn around the published one, and pushes the robot toward paths drawn
-    from it: two passes, a fit, two passes along learnt paths, two passes with a joystick, one left to obstacle
-    avoidance. What truly happened stands in the metadata record navirl.truth, which no other command reads.
+    Each participant has a reward of their own, drawn around the published one, and pushes the robot toward paths that
+    are sampled from it: two trials, a fit, two trials along learnt paths, two trials with a joystick, one trial with
+    obstacle avoidance. The metadata record navirl.truth holds the true rewards, paths and forces; no other command
+    reads it.
     """
     paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
     rows: list[tuple[Cell, ...]] = []

@@ -10,7 +10,6 @@ import click
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
-    FilePath,
     bytes_bar,
     demonstrations_in,
     echo,
@@ -18,14 +17,18 @@ from navirl_cli.commands.shared import (
     finish,
     force_option,
     json_option,
+    logs_argument,
     merged,
     output_option,
     progress_bar,
+    samples_option,
     say,
     seed_option,
     topic_option,
     topics_by_role,
 )
+from navirl_cli.commands.types import Count, FilePath
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
@@ -40,22 +43,29 @@ if TYPE_CHECKING:
 REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demos.json"
 
 
-@click.command()
-@click.argument("logs", nargs=-1, required=True, type=FilePath)
-@output_option("Folder for report, figures and numbers; made where it is missing.")
-@click.option("--questionnaire", type=FilePath, help="CSV of answers: participant,question,modality,answer.")
-@click.option("--levels", default=5, show_default=True, type=click.IntRange(2, 11), help="Of an answer: 1 to this.")
-@click.option(
-    "--samples",
-    default=1000,
-    show_default=True,
-    type=click.IntRange(2, 100_000),
-    help="Paths drawn from each learnt policy in each scene.",
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Logs with session records", "navirl study p01.mcap p02.mcap p03.mcap -o study"),
+        Example("Demonstrations that were extracted before", "navirl study demos.json --samples 100 -o study"),
+    ],
 )
-@seed_option
-@topic_option
-@json_option
-@force_option
+@logs_argument
+@section("Input", topic_option)
+@section(
+    "Questionnaire",
+    click.option(
+        "--questionnaire", type=FilePath, help="CSV of answers with columns participant,question,modality,answer."
+    ),
+    click.option("--levels", default=5, show_default=True, type=Count(2, 11), help="Answers are from 1 to this."),
+)
+@section("Learnt paths", samples_option(), seed_option)
+@section(
+    "Output",
+    output_option("Folder to write; created if it does not exist."),
+    json_option,
+    force_option,
+)
 def study(
     logs: tuple[Path, ...],
     output: Path,
@@ -69,13 +79,13 @@ def study(
 ) -> None:
     """Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.
 
-    LOG is a log, as navirl extract takes it; its metadata record navirl.session says participant, and condition and
-    cycle of each trial, as in logs that navirl import-study and navirl simulate write. A log needs no wrench. Where
-    logs want options of navirl extract, extract them first, and give its demos.json in place of them.
+    LOG is a log as for navirl extract. Its metadata record navirl.session names the participant, and the condition and
+    the cycle of each trial, as in logs written by navirl import-study and navirl simulate. A wrench is not needed. For
+    logs that need options of navirl extract, run it first and give its demos.json.
 
-    Each participant's first cycle is fitted from the study's initial parameters, the second from the first's result,
-    and all second cycles together. Writes report.md, report.html (the same in one file), summary.json (every number of
-    the tables), demos.json and figures/.
+    The first cycle of each participant is fitted from the study's initial parameters, the second cycle from the result
+    of the first; then all second cycles together. The folder holds report.md, report.html (the same in one file),
+    summary.json (all numbers of the tables), demos.json and figures/.
     """
     from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study

@@ -1,7 +1,17 @@
-"""How the command line speaks: arguments that a message names are shown as options."""
+"""How the command line speaks: help with options in sections and examples, and arguments in messages as options."""
 
 import re
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
+from weakref import WeakKeyDictionary
 
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+#: Sections that end every help.
+_LAST = ("Output", "Help")
+#: The section of an option in its command's help.
+_SECTIONS: WeakKeyDictionary[click.Parameter, str] = WeakKeyDictionary()
 _ARGUMENT = re.compile(r"`([a-z][a-z0-9_]*)`")
 
 
@@ -15,3 +25,68 @@ def as_options(text: str) -> str:
         The same with options, as in "name it with --wrench-frame". Backticks around anything else stay.
     """
     return _ARGUMENT.sub(lambda match: "--" + match[1].replace("_", "-"), text)
+
+
+class Example(NamedTuple):
+    """A command that a reader can copy, and what it is for."""
+
+    purpose: str
+    line: str
+
+
+class WithExamples(click.Command):
+    """A command whose help ends with examples.
+
+    Args:
+        examples: Two or three; tests run them on the sample logs.
+    """
+
+    def __init__(self, *args: Any, examples: Sequence[Example] = (), **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.examples = tuple(examples)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples."""
+        super().format_epilog(ctx, formatter)
+        if not self.examples:
+            return
+        with formatter.section("Examples"):
+            for purpose, line in self.examples:
+                formatter.write_text(f"{purpose}:")
+                formatter.indent()
+                formatter.write_text(f"\b\n{line}")  # never broken: it is to be copied
+                formatter.dedent()
+
+
+class Command(WithExamples):
+    """A command whose help shows options in sections, as :func:`section` puts them."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each section."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for param in self.get_params(ctx):
+            if isinstance(param, click.Option) and (record := param.get_help_record(ctx)) is not None:
+                sections.setdefault(_SECTIONS.get(param, "Help"), []).append(record)
+        for title in sorted(sections, key=lambda title: _LAST.index(title) if title in _LAST else -1):
+            with formatter.section(title):
+                formatter.write_dl(sections[title])
+
+
+def section(title: str, *options: Callable[[Any], Any]) -> Callable[[Function], Function]:
+    """Options that stand together in the help, as one decorator.
+
+    Args:
+        title: Of the section.
+        options: Decorators, as of :func:`click.option`, in the order of the help.
+    """
+
+    def decorate(function: Function) -> Function:
+        decorated: Any = function
+        before = len(getattr(function, "__click_params__", ()))
+        for option in reversed(options):
+            decorated = option(decorated)
+        for param in decorated.__click_params__[before:]:
+            _SECTIONS.setdefault(param, title)
+        return decorated  # type: ignore[no-any-return]
+
+    return decorate

@@ -7,6 +7,7 @@ import numpy as np
 
 from navirl_cli.arrays import ByContent
 from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.evaluation.metrics import Values
 
 #: Of all intervals.
@@ -76,6 +77,21 @@ def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = 
     for one in sorted(demonstrations, key=lambda one: (order.index(one.condition), one.set or "", one.cycle or 0)):
         groups.setdefault(group_of(one, fields), []).append(one)
     return groups
+
+
+def groups_named(demonstrations: Iterable[Demonstration], names: Iterable[str]) -> list[list[Demonstration]]:
+    """The demonstrations of each of several groups.
+
+    Raises:
+        DemonstrationError: A group does not exist.
+    """
+    known = by_group(demonstrations)
+    found = []
+    for name in names:
+        if name not in known:
+            raise DemonstrationError(unknown("`group`", name, known))
+        found.append(known[name])
+    return found
 
 
 def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import LEVEL, Measured, by_participant, mean_and_spread, student_half_width
 from navirl_cli.evaluation.metrics import Metric
@@ -130,8 +130,7 @@ def pairs_of(
         groups.setdefault(row.group, []).append(row)
     for name in (one, other):
         if name not in groups:
-            known = ", ".join(map(repr, groups))
-            raise DemonstrationError(f"`pair`: expected the names of two groups, found {name!r}; there are {known}")
+            raise DemonstrationError(unknown("`pair`", name, groups))
     found = {
         metric.name: paired(
             by_participant(groups[one], DRIVEN, metric.name), by_participant(groups[other], DRIVEN, metric.name), rng

@@ -120,7 +120,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
         DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
     """
     if not demonstrations:
-        raise DemonstrationError("no demonstration to learn from: check `condition`, `cycle` and `only_corrected`")
+        raise DemonstrationError("no demonstration to learn from")
     steps: dict[Scene, list[tuple[IntArray, IntArray, int]]] = {}
     scenes = scenes_of(demonstrations)
     for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.errors import RewardError
+from navirl_cli.errors import RewardError, unknown
 from navirl_cli.irl import uncertainty
 from navirl_cli.irl.adam import ascend
 from navirl_cli.irl.evidence import Evidence
@@ -128,8 +128,9 @@ def fit(
     others = [objective(x) for x in objective.starts(first)] if restarts and method is Method.NEWTON else []
     starts = [first, *(point for point in others if np.isfinite(point.value))]
     names = [parameter.name for parameter in initial.parameters]
-    if unknown := sorted(set(fixed) - set(names)):
-        raise RewardError(f"unknown parameter {', '.join(unknown)}; the reward has {', '.join(names)}")
+    for name in fixed:
+        if name not in names:
+            raise RewardError(unknown("fixed parameter", name, names))
     held = np.array([name in fixed for name in names])
     # A parameter that tells nothing here may tell something there: a person at a distance, seen with another sigma_p.
     told = np.any([objective.identified(start) for start in starts], axis=0)

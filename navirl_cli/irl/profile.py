@@ -9,7 +9,7 @@ from statistics import NormalDist
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.errors import RewardError
+from navirl_cli.errors import RewardError, unknown
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.reward import Reward
@@ -97,7 +97,7 @@ def number_of(reward: Reward, name: str) -> int:
     """
     names = [parameter.name for parameter in reward.parameters]
     if name not in names:
-        raise RewardError(f"`profile`: unknown parameter {name}; the reward has {', '.join(names)}")
+        raise RewardError(unknown("`profile`", name, names))
     return names.index(name)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.errors import RewardError
+from navirl_cli.errors import RewardError, unknown
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.terms.term import Jet, Parameter, Term
@@ -66,11 +66,10 @@ class Reward:
             RewardError: A name is unknown or a value out of bounds.
         """
         parameters = parameters_of(terms)
-        unknown = sorted(set(values) - {parameter.name for parameter in parameters})
-        if unknown:
-            raise RewardError(
-                f"unknown parameter {', '.join(unknown)}; the reward has {', '.join(p.name for p in parameters)}"
-            )
+        names = [parameter.name for parameter in parameters]
+        for name in values:
+            if name not in names:
+                raise RewardError(unknown("parameter", name, names))
         return Reward(tuple(float(values.get(p.name, p.initial)) for p in parameters), terms)
 
     @property

@@ -7,7 +7,7 @@ from enum import StrEnum
 from navirl_cli.arrays import BoolArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.timing import steps_in_contact
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.irl.evidence import Evidence, evidence_of
 
 
@@ -58,6 +58,8 @@ def select(
         for one in demonstrations
         if (not conditions or one.condition.value in conditions) and (cycle is None or one.cycle == cycle)
     ]
+    if demonstrations and not chosen:
+        raise _not_among(demonstrations, conditions, cycle)
     if only_corrected:
         chosen = _corrected(chosen)
     masks = None
@@ -67,6 +69,20 @@ def select(
     return Selection(tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen))
 
 
+def _not_among(
+    demonstrations: Sequence[Demonstration], conditions: Collection[str], cycle: int | None
+) -> DemonstrationError:
+    """The error that no demonstration is of the conditions and of the cycle, with those that there are."""
+    arguments = [*(["`condition`"] if conditions else []), *([] if cycle is None else ["`cycle`"])]
+    asked = [*([" or ".join(conditions)] if conditions else []), *([] if cycle is None else [f"cycle {cycle}"])]
+    there: dict[str, None] = {}
+    for one in demonstrations:
+        own_cycle = "no cycle" if one.cycle is None else f"cycle {one.cycle}"
+        own = [*([one.condition.value] if conditions else []), *([] if cycle is None else [own_cycle])]
+        there[", ".join(own)] = None
+    return DemonstrationError(unknown(" and ".join(arguments), ", ".join(asked), sorted(there)))
+
+
 def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:
     """Those in which the person intervened."""
     unknown = [one.id for one in chosen if one.corrected is None]
@@ -74,6 +90,10 @@ def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:
         raise DemonstrationError(
             f"`only_corrected`: expected demonstrations with a wrench, found {', '.join(unknown)} without one, so that "
             "an intervention is unknown; choose with `condition` and `cycle`"
+        )
+    if not any(one.corrected for one in chosen):
+        raise DemonstrationError(
+            "`only_corrected`: the person intervened in none of the demonstrations; learn from all of them"
         )
     return [one for one in chosen if one.corrected]
 

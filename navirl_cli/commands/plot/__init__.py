@@ -3,6 +3,7 @@
 import click
 
 from navirl_cli.commands.lazy import LazyGroup
+from navirl_cli.commands.usage import Example
 
 #: By name, in the order of the help: the file that holds the command, and its summary.
 FIGURES = {
@@ -20,6 +21,13 @@ FIGURES = {
 }
 
 
-@click.group(cls=LazyGroup, known={name: (f"{__name__}.{file}", summary) for name, (file, summary) in FIGURES.items()})
+@click.group(
+    cls=LazyGroup,
+    known={name: (f"{__name__}.{file}", summary) for name, (file, summary) in FIGURES.items()},
+    examples=[
+        Example("Demonstrated paths", "navirl plot paths demos.json -o paths.pdf"),
+        Example("Where the learnt policy leads", "navirl plot policy demos.json --reward reward.json -o policy.pdf"),
+    ],
+)
 def plot() -> None:
     """Draw paths, policies, rewards, path properties and fits."""

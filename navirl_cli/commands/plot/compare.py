@@ -8,8 +8,9 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import FilePath, demonstrations_in, demos_argument, progress_bar, seed_option
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, seed_option
+from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -17,19 +18,19 @@ if TYPE_CHECKING:
 _GROUP = "A group as in the tables of navirl evaluate, e.g. 'force, cycle 2'"
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("All demonstrations", "navirl plot ranks demos.json --reward reward.json -o ranks.pdf"),
+        Example("One group", "navirl plot ranks demos.json --reward reward.json --group 'force, cycle 2' -o ranks.png"),
+    ],
+)
 @page_options
 @demos_argument
-@reward_option
-@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
-@click.option(
-    "--samples",
-    default=1000,
-    show_default=True,
-    type=click.IntRange(1, 100_000),
-    help="Paths drawn from the policy, among which each demonstration ranks.",
+@section(
+    "Demonstrations", click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
 )
-@seed_option
+@section("Learnt paths", reward_option, samples_option(), seed_option)
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
     """Draw how demonstrations rank among paths of the policy.
 
@@ -37,12 +38,13 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
     """
     import numpy as np
 
+    from navirl_cli.evaluation.groups import groups_named
     from navirl_cli.evaluation.ranks import ranks_of, uniformity
     from navirl_cli.figures.ranks import draw_ranks
 
     demonstrations = demonstrations_in(demos)
     learnt = read_reward_for(reward, demonstrations).reward
-    chosen = [one for own in _groups(demonstrations, groups) for one in own] if groups else demonstrations
+    chosen = [one for own in groups_named(demonstrations, groups) for one in own] if groups else demonstrations
     with progress_bar("rank", len(chosen)) as update:
         found = ranks_of(
             chosen, learnt, samples, np.random.default_rng(seed), progress=lambda done, _all: update(done, "")
@@ -50,13 +52,21 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
     page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found]), uniformity(found)[1]))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Two rewards", "navirl plot compare demos.json --reward first.json --reward second.json -o two.png"),
+        Example("Two groups", "navirl plot compare demos.json --group 'force, cycle 1' --group joystick -o two.png"),
+    ],
+)
 @page_options
 @demos_argument
-@click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more.")
-@click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more.")
-@trial_option
-@crop_option
+@section(
+    "Compared",
+    click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more."),
+    click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more."),
+)
+@section("Scene", trial_option, crop_option)
 def compare(
     page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
 ) -> None:
@@ -78,9 +88,10 @@ def compare(
 
 def _draw_groups(page: Page, demonstrations: Sequence["Demonstration"], groups: Sequence[str], *, crop: bool) -> None:
     """A panel of paths for each group."""
+    from navirl_cli.evaluation.groups import groups_named
     from navirl_cli.figures.conditions import draw_path_panels
 
-    panels = list(zip(groups, _groups(demonstrations, groups), strict=True))
+    panels = list(zip(groups, groups_named(demonstrations, groups), strict=True))
     page.draw(lambda axes: draw_path_panels(axes, panels, crop=crop), panels=len(panels), columns=2)
 
 
@@ -105,18 +116,3 @@ def _draw_rewards(
     page.draw(
         lambda axes: draw_policy_and_reward(axes, rows, one.robot_radius_m, window), panels=2 * len(rows), columns=2
     )
-
-
-def _groups(demonstrations: Sequence["Demonstration"], names: Sequence[str]) -> list[list["Demonstration"]]:
-    """The demonstrations of groups.
-
-    Raises:
-        DemonstrationError: A group has no demonstrations.
-    """
-    from navirl_cli.evaluation.groups import by_group
-
-    known = by_group(demonstrations)
-    for name in names:
-        if name not in known:
-            raise DemonstrationError(f"no group is called {name!r}; there are {', '.join(map(repr, known))}")
-    return [known[name] for name in names]

@@ -7,15 +7,9 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, trial_of, trial_option
-from navirl_cli.commands.shared import (
-    FilePath,
-    demonstrations_in,
-    demos_argument,
-    progress_bar,
-    samples_option,
-    say,
-    seed_option,
-)
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -23,10 +17,16 @@ if TYPE_CHECKING:
     from navirl_cli.figures.properties import PropertyBar
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("All demonstrations", "navirl plot paths demos.json -o paths.pdf"),
+        Example("A detail, a page wide", "navirl plot paths demos.json --crop --wide -o paths.png"),
+    ],
+)
 @page_options
 @demos_argument
-@crop_option
+@section("Scene", crop_option)
 def paths(page: Page, demos: Path, crop: bool) -> None:
     """Draw all driven paths over the map, by condition.
 
@@ -38,14 +38,25 @@ def paths(page: Page, demos: Path, crop: bool) -> None:
     page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("Driven paths", "navirl plot properties demos.json -o properties.pdf"),
+        Example("Driven and learnt paths", "navirl plot properties demos.json --reward reward.json -o properties.png"),
+    ],
+)
 @page_options
 @demos_argument
-@click.option(
-    "--reward", type=FilePath, help="Learnt reward; adds bars of its paths, by the groups from which it was learnt."
+@section(
+    "Learnt paths",
+    click.option(
+        "--reward",
+        type=FilePath,
+        help="Learnt reward; adds bars of its paths, for the groups from which it was learnt.",
+    ),
+    samples_option(100),
+    seed_option,
 )
-@samples_option
-@seed_option
 def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed: int) -> None:
     """Draw length, distance and area of paths as bars, by group.
 
@@ -62,11 +73,16 @@ def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed:
     )
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("The first trial", "navirl plot forces demos.json -o forces.pdf"),
+        Example("A detail of one trial", "navirl plot forces demos.json --trial p01/3 --crop -o forces.png"),
+    ],
+)
 @page_options
 @demos_argument
-@trial_option
-@crop_option
+@section("Scene", trial_option, crop_option)
 def forces(page: Page, demos: Path, trial: str | None, crop: bool) -> None:
     """Draw the forces of one trial, over time and along its path.
 

@@ -7,11 +7,18 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.commands.plot.page import Page, page_options
-from navirl_cli.commands.shared import FilePath
+from navirl_cli.commands.types import FilePath
+from navirl_cli.commands.usage import Command, Example
 from navirl_cli.errors import ArtefactError
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("All profiles of a fit", "navirl plot profile reward.json -o profile.pdf"),
+        Example("For slides", "navirl plot profile reward.json --style screen -o profile.png"),
+    ],
+)
 @page_options
 @click.argument("reward", type=FilePath)
 def profile(page: Page, reward: Path) -> None:
@@ -30,7 +37,13 @@ def profile(page: Page, reward: Path) -> None:
     page.save(figure, trim=False)
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("A fit", "navirl plot convergence reward.json -o convergence.pdf"),
+        Example("A page wide", "navirl plot convergence reward.json --wide -o convergence.png"),
+    ],
+)
 @page_options
 @click.argument("reward", type=FilePath)
 def convergence(page: Page, reward: Path) -> None:

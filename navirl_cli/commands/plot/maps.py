@@ -10,7 +10,9 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import Function, demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.types import Choice, Count
+from navirl_cli.commands.usage import Command, Example, Function, section
 
 if TYPE_CHECKING:
     from navirl_cli.arrays import FloatArray
@@ -89,32 +91,39 @@ def scene_options(function: Function) -> Function:
         learnt = read_reward_for(reward, demonstrations).reward
         return function(page, Sight(demonstrations, trial_of(demonstrations, trial), learnt, **others))
 
-    options = (
-        demos_argument,
+    scene = section(
+        "Scene",
         reward_option,
         trial_option,
         crop_option,
         click.option(
             "--overlay",
             multiple=True,
-            type=click.Choice((DEMOS, SAMPLES)),
+            type=Choice((DEMOS, SAMPLES)),
             help="Draw paths over the map: demonstrated in this scene, or sampled from the policy; repeatable.",
         ),
         click.option(
             "--samples",
             default=20,
             show_default=True,
-            type=click.IntRange(1, 1000),
+            type=Count(1, 1000),
             help="Paths sampled from the policy for --overlay samples.",
         ),
         seed_option,
     )
-    for decorate in reversed(options):
-        packed = decorate(packed)
-    return page_options(packed)  # type: ignore[return-value]
+    return page_options(demos_argument(scene(packed)))  # type: ignore[return-value]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("The first trial", "navirl plot policy demos.json --reward reward.json -o policy.pdf"),
+        Example(
+            "One trial, with demonstrated paths",
+            "navirl plot policy demos.json --reward reward.json --trial p01/3 --overlay demos -o policy.png",
+        ),
+    ],
+)
 @scene_options
 def policy(page: Page, sight: Sight) -> None:
     """Draw expected visits of every cell under the learnt policy.
@@ -126,7 +135,13 @@ def policy(page: Page, sight: Sight) -> None:
     page.draw(lambda axes: draw_policy(axes[0], sight.scene, sight.visits, **sight.options))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("The first trial", "navirl plot reward demos.json --reward reward.json -o reward.pdf"),
+        Example("A detail", "navirl plot reward demos.json --reward reward.json --crop -o reward.png"),
+    ],
+)
 @scene_options
 def reward(page: Page, sight: Sight) -> None:
     """Draw the learnt reward of every cell.
@@ -138,7 +153,16 @@ def reward(page: Page, sight: Sight) -> None:
     page.draw(lambda axes: draw_reward(axes[0], sight.scene, sight.reward.by_cell(sight.scene), **sight.options))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("The first trial", "navirl plot value demos.json --reward reward.json -o value.pdf"),
+        Example(
+            "With sampled paths",
+            "navirl plot value demos.json --reward reward.json --overlay samples -o value.png",
+        ),
+    ],
+)
 @scene_options
 def value(page: Page, sight: Sight) -> None:
     """Draw the soft value of every cell, with contour lines.
@@ -150,7 +174,13 @@ def value(page: Page, sight: Sight) -> None:
     page.draw(lambda axes: draw_value(axes[0], sight.scene, sight.policy.value, **sight.options))
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=[
+        Example("The first trial", "navirl plot actions demos.json --reward reward.json -o actions.pdf"),
+        Example("A page wide", "navirl plot actions demos.json --reward reward.json --crop --wide -o actions.png"),
+    ],
+)
 @scene_options
 def actions(page: Page, sight: Sight) -> None:
     """Draw the most likely move in every cell as an arrow.

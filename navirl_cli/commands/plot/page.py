@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.commands.shared import FilePath, Function, force_option
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.commands.shared import force_option
+from navirl_cli.commands.types import Choice, FilePath
+from navirl_cli.commands.usage import Function, section
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.files import check_writable
 
 if TYPE_CHECKING:
@@ -95,23 +97,22 @@ def page_options(function: Function) -> Function:
         check_writable(output, force=force)
         return function(page=Page(output, wide, style, force), **others)
 
-    options = (
+    figure_options = section(
+        "Output",
         click.option("-o", "--output", type=FigurePath(), required=True, help="Figure to write: .png, .pdf or .svg."),
         click.option(
             "--wide", is_flag=True, help="Width of a page with two columns (7.16 in) instead of one column (3.5 in)."
         ),
         click.option(
             "--style",
-            type=click.Choice(STYLES),
+            type=Choice(STYLES),
             default="paper",
             show_default=True,
             help="paper: 300 dpi; screen: 600 dpi; dark: light ink on near-black, 600 dpi.",
         ),
         force_option,
     )
-    for decorate in reversed(options):
-        packed = decorate(packed)
-    return packed  # type: ignore[return-value]
+    return figure_options(packed)  # type: ignore[return-value]
 
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
@@ -128,4 +129,4 @@ def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "D
     for one in demonstrations:
         if trial in {None, one.id}:
             return one
-    raise DemonstrationError(f"no trial is called {trial!r}; there are {', '.join(one.id for one in demonstrations)}")
+    raise DemonstrationError(unknown("`trial`", trial, [one.id for one in demonstrations]))

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from navirl_cli.errors import LogError
+from navirl_cli.errors import LogError, unknown
 from navirl_cli.logs.messages.reader import Contents
 from navirl_cli.logs.messages.schema import full_name
 from navirl_cli.logs.roles import message_types
@@ -163,9 +163,10 @@ def choose(log: str, topics: Mapping[str, Topic], requested: Mapping[str, Sequen
     Raises:
         LogError: A role does not exist, or a requested topic does not fit.
     """
-    unknown = sorted(set(requested) - {role.name for role in ROLES})
-    if unknown:
-        raise LogError(f"`topic`: no role is called {unknown[0]}; roles are {', '.join(role.name for role in ROLES)}")
+    names = [role.name for role in ROLES]
+    for name in requested:
+        if name not in names:
+            raise LogError(unknown("`topic`", name, names))
     return {role.name: _choice(log, role, topics, requested.get(role.name, ())) for role in ROLES}
 
 
@@ -198,12 +199,14 @@ def _requested(log: str, role: Role, topics: Mapping[str, Topic], name: str) -> 
     """A topic that the user named."""
     types = [one.name for one in role.message_types]
     topic = topics.get(name)
-    if topic is None or topic.type_name not in types:
-        found = "no such topic" if topic is None else short_name(topic.type_name)
-        raise LogError(
-            f"{log}: `topic` {role.name}={name}: expected {' or '.join(map(short_name, types))}, found {found}"
-        )
-    return topic
+    if topic is not None and topic.type_name in types:
+        return topic
+    field = f"{log}: `topic` {role.name}"
+    fitting = [one.name for one in topics.values() if one.type_name in types]
+    if topic is None and fitting:
+        raise LogError(unknown(field, name, fitting))
+    found = repr(name) if topic is None else f"{name!r} of type {short_name(topic.type_name)}"
+    raise LogError(f"{field}: expected a topic of type {' or '.join(map(short_name, types))}, found {found}")
 
 
 def _problem(role: Role, of_type: Sequence[Topic]) -> str:

@@ -1,0 +1,91 @@
+"""Types of options and arguments: what their words may be, and how the shell completes them."""
+
+from collections.abc import Sequence
+from math import isfinite
+from os import fsdecode
+from pathlib import Path
+from typing import Any
+
+import click
+
+from navirl_cli.errors import unknown
+
+FilePath = click.Path(path_type=Path)
+
+
+class Choice(click.Choice[str]):
+    """One of several words; for another one, the near ones are proposed."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:  # noqa: ARG002
+        """What there is, and what was meant."""
+        return unknown("", value, self.choices)
+
+
+class RoleTopic(click.ParamType):  # type: ignore[type-arg]
+    """``ROLE=/topic``, for one of the roles that extract knows."""
+
+    name = "role=/topic"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, str]:
+        """Split at the first equals sign."""
+        from navirl_cli.logs.roles.topics import ROLES
+
+        role, equals, topic = str(value).partition("=")
+        if not (role and equals and topic):
+            self.fail(f"expected ROLE=/topic, found {value!r}", param, ctx)
+        roles = [one.name for one in ROLES]
+        if role not in roles:
+            self.fail(unknown("role", role, roles), param, ctx)
+        return role, topic
+
+
+class Number(click.FloatRange):
+    """A finite number within bounds: click's own takes nan, which no bound stops."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Parse and check."""
+        number = float(super().convert(value, param, ctx))
+        if not isfinite(number):
+            self.fail(f"expected a finite number, found {value!r}", param, ctx)
+        return number
+
+
+class Count(click.IntRange):
+    """A whole number within bounds."""
+
+    name = "integer"
+
+
+class Point(click.ParamType):  # type: ignore[type-arg]
+    """A point as ``x,y`` in m."""
+
+    name = "x,y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Parse two numbers."""
+        try:
+            x, y = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"expected two numbers in m as x,y, found {value!r}", param, ctx)
+        if not (isfinite(x) and isfinite(y)):
+            self.fail(f"expected finite numbers, found {value!r}", param, ctx)
+        return x, y
+
+
+class OutputPath(click.Path):
+    """The name of a file to write, whose ending chooses the format."""
+
+    def __init__(self, endings: Sequence[str]) -> None:
+        super().__init__(path_type=Path)
+        self.endings = tuple(endings)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Refuse an ending that is no format."""
+        path = Path(fsdecode(super().convert(value, param, ctx)))
+        if path.suffix.lower() not in self.endings:
+            *others, last = self.endings
+            endings = f"{', '.join(others)} or {last}" if others else last
+            self.fail(f"expected a name that ends in {endings}, found {path.name!r}", param, ctx)
+        return path
