@@ -74,16 +74,16 @@ def test_what_is_lost_is_told_and_the_rest_is_written(navirl, study):
     broken, missing, nothing = result.stderr.splitlines()
     assert broken == (
         "navirl: runs/p1/joystick_demos.pkl: expected only names that the published study needs, found os.system "
-        "before byte 11; nothing was run; fetch the file from its authors anew"
+        "before byte 11; no code was run; download the file from its authors again"
     )
     assert missing == (
-        "navirl: runs/p2: expected force_parcours_times.txt, joystick_parcours_times.txt too, found none; what they "
-        "hold is left out"
+        "navirl: runs/p2: expected force_parcours_times.txt, joystick_parcours_times.txt too, found no such files; "
+        "their data are left out"
     )
     assert nothing == (
         "navirl: runs/p3: expected demonstrations and a map, found none: runs/p3/force_demos.pkl: expected a pickle of "
-        "protocol 0, as the study is published, found operation 'h' before byte 1 of 5; fetch the file from its "
-        "authors anew (and 1 more)"
+        "protocol 0, as the study is published, found operation 'h' before byte 1 of 5; download the file from its "
+        "authors again (and 1 more)"
     )
     assert "p2.mcap      10  not known" in result.stdout
 
@@ -119,7 +119,7 @@ def test_a_damaged_archive_is_refused(navirl, study):
     (study / "runs.tar.gz").write_bytes(whole[: len(whole) // 2])
     result = navirl("import-study", "runs.tar.gz", "-o", "logs", code=1)
     assert result.stderr.startswith(
-        "navirl: runs.tar.gz: expected a whole tar archive of the study (runs.tar.gz), found "
+        "navirl: runs.tar.gz: expected an intact tar archive of the study (runs.tar.gz), found "
     )
 
 

@@ -15,8 +15,9 @@ from navirl_cli.errors import ArtefactError
 from navirl_cli.published import archive
 from navirl_cli.published.runs import DEMONSTRATIONS, EXPECTED, runs_in
 
-WHOLE = (
-    r"^{}: expected a whole tar archive of the study \(runs\.tar\.gz\), found {}; fetch it anew, or name the folder "
+INTACT = (
+    r"^{}: expected an intact tar archive of the study \(runs\.tar\.gz\), found {}; download it again, or give the "
+    "folder "
 )
 FILES = {"runs/7/nav_map.pkl": b"map", "runs/7/params.pkl": b"ignored", "runs/12/force_demos.pkl": b"demos"}
 
@@ -27,7 +28,7 @@ def path(tmp_path):
 
 
 def refused(path, found):
-    return pytest.raises(ArtefactError, match=WHOLE.format(path, found))
+    return pytest.raises(ArtefactError, match=INTACT.format(path, found))
 
 
 def header(name, size, kind=tarfile.REGTYPE):
@@ -202,7 +203,7 @@ def test_a_name_that_cannot_be_written_is_left_out(path):
     path.write_bytes(forge.archive(FILES | {"runs/7\n/nav_map.pkl": b"x", "runs/\udcff/nav_map.pkl": b"x"}))
     runs, lost = runs_in(path)
     assert sorted(contents(runs)) == ["12", "7"]
-    assert [line.endswith(": its name cannot be written; left out") for line in lost] == [True, True]
+    assert [line.endswith(": its name is not printable; left out") for line in lost] == [True, True]
     assert all(line.isprintable() for line in lost)
 
 
@@ -237,7 +238,7 @@ def test_what_is_no_plain_file_of_a_folder_is_left_out(tmp_path, monkeypatch):
     assert run.files == {}
     left = sorted([*DEMONSTRATIONS, "nav_map.pkl"])
     assert list(run.lost) == [
-        f"{tmp_path / name}: expected a file of at most 0 MB, found another; left out" for name in left
+        f"{tmp_path / name}: expected a file of at most 0 MB, found something else; left out" for name in left
     ]
 
 
@@ -251,7 +252,7 @@ def test_without_participants_there_is_nothing_to_import(tmp_path, kind):
     with pytest.raises(
         ArtefactError,
         match=rf"^{root}: expected the study's archive \(runs\.tar\.gz\), or the folder into which it was unpacked, "
-        r"with a folder for each participant that holds force_demos\.pkl, found none; give the one or the other$",
+        r"with a folder for each participant that holds force_demos\.pkl, found none; give one of the two$",
     ):
         runs_in(root)
 
@@ -278,5 +279,5 @@ def test_other_compressions_are_named(tmp_path, pack, name):
 
 
 def test_nothing_there_is_said(tmp_path):
-    with pytest.raises(ArtefactError, match=r"nosuch: expected the study's archive or folder, found nothing there"):
+    with pytest.raises(ArtefactError, match=r"nosuch: expected the study's archive or folder, found neither"):
         runs_in(tmp_path / "nosuch")
