@@ -1,4 +1,4 @@
-"""navirl import-study: archives and folders in, logs out, and what is lost is told."""
+"""navirl import-study: archives and folders in, logs out, and losses are reported."""
 
 import json
 import shutil
@@ -64,7 +64,7 @@ def test_one_participants_folder_and_json(navirl, study):
     }
 
 
-def test_what_is_lost_is_told_and_the_rest_is_written(navirl, study):
+def test_what_is_lost_is_reported_and_the_rest_is_written(navirl, study):
     (study / "runs" / "p1" / "joystick_demos.pkl").write_bytes(b"cos\nsystem\n(S'true'\ntR.")
     write(study / "runs" / "p3", {"force_demos.pkl": b"hello"})
     (study / "runs" / "p2" / "force_parcours_times.txt").unlink()
@@ -88,7 +88,7 @@ def test_what_is_lost_is_told_and_the_rest_is_written(navirl, study):
     assert "p2.mcap      10  not known" in result.stdout
 
 
-def test_nothing_usable_is_known_trouble(navirl, study):
+def test_no_usable_data_is_an_expected_error(navirl, study):
     shutil.rmtree(study / "runs")
     write(study / "runs" / "p3", {"force_demos.pkl": b"hello"})
     result = navirl("import-study", "runs", "-o", "logs", code=1)
@@ -109,7 +109,7 @@ def test_logs_are_not_overwritten_unless_forced(navirl, study):
 
 
 @pytest.mark.usefixtures("study")
-def test_a_folder_that_cannot_be_made_is_told(navirl):
+def test_a_folder_that_cannot_be_made_is_reported(navirl):
     result = navirl("import-study", "runs", "-o", "runs.tar.gz", code=1)
     assert result.stderr == "navirl: runs.tar.gz: cannot be made a folder: File exists; choose another --output\n"
 

@@ -1,4 +1,4 @@
-"""What was published of a participant, checked: what does not fit is left out and told by file, list and number."""
+"""The published data of a participant, checked: invalid data are left out and reported by file, list and number."""
 
 import numpy as np
 import published_factory as forge
@@ -36,7 +36,7 @@ def names(found):
     return [path.name for path in found.paths]
 
 
-def test_a_whole_participant():
+def test_a_complete_participant():
     found = read()
     assert found.lost == ()
     assert [(path.name, path.part) for path in found.paths] == ORDER
@@ -90,7 +90,7 @@ def test_completion_times_of_several_courses():
 
 
 @pytest.mark.parametrize("data", [b"", b"fast\n", b"12.5 -1\n", b"nan", b"inf", b"0", b"\xff\xfe1", b"1 " * 9999])
-def test_completion_times_that_are_none_are_told(data):
+def test_invalid_completion_times_are_reported(data):
     found = read({"force_parcours_times.txt": data})
     assert found.completion_s == {"joystick": (16.9999983311,)}
     (line,) = found.lost
@@ -100,7 +100,7 @@ def test_completion_times_that_are_none_are_told(data):
     )
 
 
-def test_missing_files_are_told_and_the_rest_is_taken():
+def test_missing_files_are_reported_and_the_rest_is_used():
     found = read({"joystick_demos.pkl": None, "joystick_parcours_times.txt": None})
     assert names(found) == [name for name in NAMES if not name.startswith("joystick")]
     (lost,) = found.lost
@@ -122,7 +122,7 @@ def test_a_missing_map_is_taken_from_the_demonstrations():
     assert line.startswith("runs/7/nav_map.pkl: expected a pickle of protocol 0")
 
 
-def test_a_broken_file_is_told_and_the_rest_is_taken():
+def test_a_broken_file_is_reported_and_the_rest_is_used():
     found = read({"force_demos.pkl": forge.participant()["force_demos.pkl"][:-1]})
     assert names(found) == NAMES[6:]
     (line,) = found.lost
@@ -176,7 +176,7 @@ LIST = "expected lists of demonstrations by their names, found something else; d
         ),
     ],
 )
-def test_a_file_of_something_else_is_told(content, message):
+def test_a_file_of_something_else_is_reported(content, message):
     found = read({"force_demos.pkl": forge.dumped(content)})
     assert names(found) == NAMES[6:]
     assert found.lost == (f"runs/7/force_demos.pkl: {message}",)
@@ -222,20 +222,20 @@ OTHER = (
         (demonstration(nav_map=nav_map(origin=(-3.0, 1.0))), OTHER + "(-3.0, 1.0) m)"),
     ],
 )  # fmt: skip
-def test_a_demonstration_of_something_else_is_told(value, message):
+def test_a_demonstration_of_something_else_is_reported(value, message):
     found = read(passing_1=[demonstration(0.3), value])
     assert names(found) == [name for name in NAMES if name != "force_demos/passing_1/2"]
     assert found.lost == (f"runs/7/force_demos.pkl/passing_1/2: {message}; download the file again",)
 
 
 @pytest.mark.parametrize("field", ["world_poses", "people_pos", "grid_path"])
-def test_a_demonstration_without_a_field_is_told(field):
+def test_a_demonstration_without_a_field_is_reported(field):
     (line,) = read(passing_1=[demonstration(0.3, **{field: None}), demonstration(0.3)]).lost
     assert line.startswith(f"runs/7/force_demos.pkl/passing_1/1: {field}: expected pairs of ")
     assert line.endswith(", found none; download the file again")
 
 
-def test_very_long_lists_are_told(monkeypatch):
+def test_very_long_lists_are_reported(monkeypatch):
     monkeypatch.setattr(fields, "MOST_ROWS", 70)
     found = read(passing_1=[demonstration(0.3, world_poses=[(0.0, 0.1 * i) for i in range(71)]), demonstration(0.3)])
     assert found.lost == (f"runs/7/force_demos.pkl/passing_1/1: {POSES}71 of them; download the file again",)
@@ -275,7 +275,7 @@ SIZE = "expected a map of {} x {} cells, found {}"
         (nav_map(turned=0.5), "ros_occupancy_map: expected cells along the axes of the map's frame, " + ROTATED),
     ],
 )  # fmt: skip
-def test_a_map_of_something_else_is_told(value, message):
+def test_a_map_of_something_else_is_reported(value, message):
     found = read({"nav_map.pkl": forge.dumped(value)})
     assert names(found) == NAMES, "the demonstrations' own map serves"
     assert found.lost == (f"runs/7/nav_map.pkl: {message}; download the file again",)
@@ -287,7 +287,7 @@ def test_a_map_as_an_array():
     assert (found.occupancy.data == DATA).all()
 
 
-def test_wrong_bytes_give_a_participant_or_known_trouble():
+def test_wrong_bytes_give_a_participant_or_an_expected_error():
     rng = np.random.default_rng(1)
     files = {"nav_map.pkl": forge.participant()["nav_map.pkl"]}
     whole = np.frombuffer(forge.dumped({"passing_1": demonstration(0.3, nav_map=None)}), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Pickles are read as data: the same values as Python's unpickler gives, and nothing that it could be made to do."""
+"""Pickles are read as data: the same values as Python's unpickler gives, and no code is run."""
 
 import pickle
 import pickletools
@@ -97,7 +97,7 @@ RUNS = {
         ("within", "numpy.load.__globals__"),
     ],
 )
-def test_a_pickle_that_names_anything_else_is_refused_and_nothing_runs(tmp_path, way, name):
+def test_a_pickle_that_names_anything_else_is_refused_and_runs_no_code(tmp_path, way, name):
     marker = tmp_path / "ran"
     forged = RUNS[way].format(marker=marker).encode()
     with pytest.raises(
