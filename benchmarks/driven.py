@@ -1,11 +1,10 @@
-"""Lines as a robot would drive them along paths of cells, put back on a grid by every rule and learnt from again.
+"""Lines as a robot would drive them along paths of cells, rasterised by every rule and used for a fit.
 
-Paths of cells are drawn from the policy of known parameters. The line that is driven along one knows its cells but not
-their centres: it is led through a point drawn uniformly in each cell, its corners are rounded as by a robot that
-answers in a while, and it is seen as poses with noise. Only its ends are centres, as marks on the floor may be. The
-lines then go back on the grid, or on one that lies off it by a random part of a cell, as maps do. What is learnt from
-that is compared with what is learnt from the drawn cells themselves: the difference is what driving and rule add, free
-of what the estimator does by chance or by itself.
+Paths of cells are sampled from the policy of known parameters. A line is driven along each: through a uniformly sampled
+point in each cell, with corners rounded as by a robot that responds late, and observed as poses with noise. Only its
+ends are centres, as marks on the floor may be. The lines are rasterised on the same grid, or on one shifted by a random
+part of a cell, as maps are. The fit to these cells is compared with the fit to the sampled cells. The difference is due
+to driving and rule, without the estimator's own bias and chance.
 """
 
 from collections.abc import Sequence
@@ -33,22 +32,22 @@ RULES = tuple(Rule)
 
 @dataclass(frozen=True)
 class World:
-    """How lines are driven and seen."""
+    """How lines are driven and observed."""
 
     name: str
     #: Standard deviation of the Gaussian along the line that rounds its corners, m.
     smoothing_m: float
     #: Standard deviation of each coordinate of a pose, m.
     noise_m: float
-    #: Whether the grid lies off the drawn cells.
+    #: Whether the grid is shifted against the sampled cells.
     shifted: bool
 
 
 @dataclass(frozen=True)
 class Refits:
-    """One data set learnt from its drawn cells and from the cells of every rule."""
+    """Fits to one data set: to its sampled cells and to the cells of every rule."""
 
-    #: (k,) parameters and standard errors from the drawn cells.
+    #: (k,) parameters and standard errors from the sampled cells.
     theta: FloatArray
     errors: FloatArray
     #: (rules, k) parameters from each rule's cells.
@@ -56,19 +55,19 @@ class Refits:
     #: (rules,) share of cells that are in both paths (of those in either), and diagonal steps a path.
     shared: FloatArray
     diagonal: FloatArray
-    #: Diagonal steps of the drawn paths.
+    #: Diagonal steps of the sampled paths.
     drawn_diagonal: float
 
 
 def refits(scene: Scene, truth: Reward, count: int, seeds: tuple[int, int], world: World) -> Refits:
-    """Draw a data set, drive it, put it on the grid by every rule, learn.
+    """Sample a data set, drive it, rasterise it by every rule, fit.
 
     Args:
-        scene: Where.
-        truth: From whose policy.
+        scene: Map, start, goal and people.
+        truth: The reward whose policy is sampled.
         count: Number of demonstrations.
-        seeds: Of the data set; worlds share their paths and what is drawn along them.
-        world: How it is driven and seen.
+        seeds: Of the data set; worlds share the paths and the random numbers along them.
+        world: How it is driven and observed.
     """
     rng = np.random.default_rng(seeds)
     sampled = sample_paths(policy_of(truth, scene), scene.start, count, rng)
@@ -99,7 +98,7 @@ def overall(worlds: Sequence[FloatArray]) -> FloatArray:
 
 
 def resampled(worlds: Sequence[FloatArray], count: int = 2000, seed: int = 0) -> FloatArray:
-    """(count, rules) overall figures with the data sets of every world drawn again with replacement."""
+    """(count, rules) overall figures with the data sets of every world resampled with replacement."""
     rng = np.random.default_rng(seed)
     return np.array(
         [overall([away[rng.integers(0, len(away), len(away))] for away in worlds]) for _ in range(count)],
@@ -115,7 +114,7 @@ def best_rule(worlds: Sequence[FloatArray]) -> Rule:
 
 
 def _driven(cells: IntArray, grid: Grid, world: World, rng: np.random.Generator) -> FloatArray:
-    """(n, 2) m: poses of a robot that was led through the cells."""
+    """(n, 2) m: poses of a robot that drove through the cells."""
     half = grid.resolution_m / 2
     points = grid.centres_of(cells)
     points[1:-1] += rng.uniform(-half, half, (len(cells) - 2, 2))
@@ -125,7 +124,7 @@ def _driven(cells: IntArray, grid: Grid, world: World, rng: np.random.Generator)
 
 
 def _learnt(demonstrations: Sequence[Demonstration], truth: Reward) -> tuple[FloatArray, FloatArray]:
-    """Parameters and standard errors; from the truth one start is enough."""
+    """Parameters and standard errors; one start at the truth is enough."""
     found = fit(evidence_of(demonstrations), truth, l2=0.0, restarts=False)
     return np.array(found.reward.theta), found.standard_errors
 

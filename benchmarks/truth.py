@@ -1,7 +1,7 @@
-"""Hold what extraction finds in the sample logs to what truly happened in them.
+"""Compare the demonstrations extracted from the sample logs with the simulated truth.
 
 python benchmarks/truth.py [--quick] [--json]. Each row ends with its bar; exit 0 only where every bar holds. The same
-bars are tests; here are the figures. It takes a few seconds, --quick changes nothing.
+bars are tests; this prints the figures. It takes a few seconds; --quick does the same.
 """
 
 import argparse
@@ -41,10 +41,10 @@ def main() -> int:
                 held = min(held, float(size[inside].sum() / size.sum()))
             false = max(false, float((inside & (size == 0)).sum() / (size == 0).sum()))
     rows = [
-        ("trials missed or invented", missed, "0", missed == 0),
-        ("worst position error, m", off, "< 0.02", off < 0.02),
-        ("least share of impulse in contacts", held, ">= 0.95", held >= 0.95),
-        ("most time without contact called contact", false, "< 0.05", false < 0.05),
+        ("trials missed or too many", missed, "0", missed == 0),
+        ("largest position error, m", off, "< 0.02", off < 0.02),
+        ("smallest share of impulse in contacts", held, ">= 0.95", held >= 0.95),
+        ("largest share of false contact", false, "< 0.05", false < 0.05),
     ]
     if options.json:
         print(json.dumps([{"what": what, "value": value, "bar": bar, "holds": ok} for what, value, bar, ok in rows]))

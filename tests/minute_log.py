@@ -1,4 +1,4 @@
-"""A minute of log with 33,000 wanted messages, in variants of the format, and what stands where in it."""
+"""A minute of log with 33,000 wanted messages, in variants of the format, and the places of its parts."""
 
 import io
 import re
@@ -63,7 +63,7 @@ BEHIND = "everything after it is lost"
 
 
 class Log:
-    """An intact file, and what stands where in it."""
+    """An intact file, and the places of its parts."""
 
     def __init__(self, path: Path) -> None:
         self.data = path.read_bytes()

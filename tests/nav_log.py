@@ -310,7 +310,7 @@ def drive(
     stall: tuple[float, float] = (0.0, 0.0),
     skip: Iterable[str] = (),
 ) -> Log:
-    """A run whose numbers tell the true time s: the robot's x and map -> odom's y are s / 10, the force is s N.
+    """A run whose numbers give the true time s: the robot's x and map -> odom's y are s / 10, the force is s N.
 
     Args:
         lasts_s: How long, s.

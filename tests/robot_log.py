@@ -1,4 +1,4 @@
-"""A small log of a robot that drives 4 m and is pushed on the way, with any part of it left out or spoilt."""
+"""A small log of a robot that drives 4 m and is pushed, with any part left out or damaged."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ ODOMETRY_HZ, PEOPLE_HZ = 30, 5
 
 @dataclass(frozen=True)
 class Run:
-    """What to write; the defaults make a sound log."""
+    """What to write; the defaults make an intact log."""
 
     wrench_topics: tuple[str, ...] = ("/wrench",)
     odometry: bool = True
@@ -27,7 +27,7 @@ class Run:
     obstacles: tuple[tuple[int, int], ...] = ()
     map_yaw: float = 0.0
     people: tuple[tuple[float, float], ...] | None = ((2.0, 0.9),)
-    #: People who walk: corners (seconds, x, y) of each one's way, seen from the first to the last. With any, messages
+    #: People who walk: corners (seconds, x, y) of each one's path, seen from the first to the last. With any, messages
     #: come at 5 Hz: first those who stand, then the walkers who are seen.
     walks: tuple[tuple[tuple[float, float, float], ...], ...] = ()
     #: How long the log lasts; after its drive the robot stands.
@@ -107,7 +107,7 @@ def force_n(run: Run, seconds: np.ndarray) -> np.ndarray:
 
 
 def _driven_m(run: Run, seconds: np.ndarray) -> np.ndarray:
-    """(n, 2) m where a robot is that gives way to pushes."""
+    """(n, 2) m places of a robot that gives way to pushes."""
     fine = np.arange(0, run.lasts_s, 0.001)
     aside = run.gain * np.cumsum(force_n(run, fine), axis=0) * 0.001
     pushed = np.stack([np.interp(seconds, fine, axis) for axis in aside.T], axis=1)

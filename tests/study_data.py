@@ -1,4 +1,4 @@
-"""The published study, where it is at hand."""
+"""The published study, where it is available."""
 
 import json
 import os

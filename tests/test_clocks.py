@@ -40,7 +40,7 @@ def misaligned_s(recording):
 
 
 def check_aligned(recording, within_s, poses=400):
-    """Forces, poses and tf must go by one clock: what tf says of y cancels out what the odometry says."""
+    """Forces, poses and tf must go by one clock: y in tf cancels out y in the odometry."""
     assert len(recording.t_ns) == poses
     assert misaligned_s(recording).max() < within_s
     assert np.abs(recording.xy_m[:, 1]).max() < 0.011
@@ -70,7 +70,7 @@ def everywhere(clock):
 # one clock
 
 
-def test_sound_stamps_are_kept_to_the_nanosecond(load):
+def test_intact_stamps_are_kept_to_the_nanosecond(load):
     recording = load()
     assert recording.t_ns.tolist() == nav.unix(np.arange(400) / 20).tolist()
     assert recording.wrench.t_ns.tolist() == nav.unix(np.arange(2000) / 100).tolist()
@@ -123,7 +123,7 @@ def test_some_stamps_of_0_are_received_times(load):
         "run.mcap: 30 messages on /odom are stamped 0; their times of receipt are used",
         "run.mcap: 150 messages on /wrench are stamped 0; their times of receipt are used",
     )
-    # tf begins late: poses up to a second earlier are placed by its first word
+    # tf begins late: poses up to a second earlier are placed by the first transform
     assert (recording.t_ns[0] - nav.simulated(100.0)(0)) / 1e9 == pytest.approx(0.5, abs=0.02)
     assert misaligned_s(recording).max() < 0.02
 
@@ -206,7 +206,7 @@ def test_a_clock_that_is_set_back_for_good_beside_the_odometry(load):
     check_aligned(recording, 0.02)
 
 
-def test_a_wild_stamp_in_tf_moves_nothing(load):
+def test_a_wild_stamp_in_tf_moves_no_pose(load):
     recording = load(tf_clock=changed(nav.unix, r100=5))
     assert recording.notes == ()
     check_aligned(recording, 1e-9)
@@ -217,7 +217,7 @@ def test_a_wild_stamp_in_tf_moves_nothing(load):
 
 @pytest.mark.parametrize("receipt", [0, nav.START_NS - 10**14, 2**63 - 1])
 @pytest.mark.parametrize("topic", ["/odom", "/wrench", "/tf", "/map"])
-def test_a_wild_time_of_receipt_moves_nothing(load, topic, receipt):
+def test_a_wild_time_of_receipt_moves_no_time(load, topic, receipt):
     log = nav.drive(8.0)
     rows = [row for row, one in enumerate(log.messages) if one.topic == topic]
     middle = rows[len(rows) // 2]
@@ -293,11 +293,11 @@ def test_tf_that_lies_ahead_is_no_other_clock(load):
     recording = load(tf_clock=nav.off(1.0))
     assert recording.notes == ()
     assert len(recording.t_ns) == 400
-    # as tf2 would: what AMCL says of now holds in a second
+    # as in tf2: the transform that AMCL sends now is stamped a second ahead
     assert recording.xy_m[100:, 1] == pytest.approx(-0.1, abs=0.011)
 
 
-# messages that are said once
+# messages that are sent once
 
 
 def test_a_goal_from_a_laptop_whose_clock_is_off(load):
@@ -310,7 +310,7 @@ def test_a_goal_from_a_laptop_whose_clock_is_off(load):
     assert recording.goal_m.tolist() == [[1.0, 2.0], [1.0, 0.0]]
 
 
-def test_people_that_are_latched_are_as_old_as_they_say(load):
+def test_latched_people_keep_their_old_stamps(load):
     log = nav.drive()
     long_ago = nav.START_NS - 3600 * 10**9
     log.add("/people", nav.pose_array(long_ago, [(1.0, 2.0)]), nav.START_NS)
@@ -382,7 +382,7 @@ def test_a_recorder_that_gives_all_messages_one_time():
     assert clock.times(clock.reference).tolist() == stamps.tolist()
 
 
-def test_stamps_that_say_nothing_are_not_moved_over_jumps():
+def test_stamps_of_0_are_not_moved_over_jumps():
     seconds = np.arange(400) / 20
     log_ns = nav.unix(seconds)
     clock = Clock(stamped(jumping((8.0, -1000.0))(seconds), log_ns))

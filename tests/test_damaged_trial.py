@@ -1,4 +1,4 @@
-"""Damaged logs that still hold a trial: what extract and inspect tell, and how they end."""
+"""Damaged logs that still hold a trial: the reports and exit codes of extract and inspect."""
 
 import json
 import re
@@ -17,7 +17,7 @@ from navirl_cli.logs.load import LoadOptions, load_recording
 
 @pytest.fixture(scope="module")
 def messages(tmp_path_factory):
-    """A robot's drive, as messages that can be written in any way."""
+    """A robot's drive, as messages for any variant of the format."""
     found = strict_log.walk(write_run(tmp_path_factory.mktemp("run") / "run.mcap").read_bytes())
     return [
         forge.Message(topic, found.schemas[schema_id][0], told.log_time_ns, told.payload)
@@ -28,7 +28,7 @@ def messages(tmp_path_factory):
 
 @pytest.fixture
 def written(messages, tmp_path, monkeypatch):
-    """Write the drive in a way, with chunks of a sixth of a second."""
+    """Write the drive in a variant, with chunks of a sixth of a second."""
     monkeypatch.chdir(tmp_path)
 
     def write(way: str) -> Path:
@@ -63,7 +63,7 @@ def cut_in_the_last_second(path):
 BREAKS = [cut_tail, wrong_crc, cut_in_the_last_second]
 
 
-def test_a_sound_log_ends_well(written, navirl):
+def test_an_intact_log_gives_exit_code_0(written, navirl):
     path = written("zstd")
     assert navirl("extract", path, "-o", "demos.json").stderr == ""
     assert navirl("inspect", "--check", path).stderr == ""
@@ -83,7 +83,7 @@ def test_a_damaged_log_is_used_and_its_damage_listed(written, navirl, broken):
 
 
 @pytest.mark.parametrize("broken", BREAKS)
-def test_a_damaged_log_is_refused_where_that_is_wished(written, broken):
+def test_a_damaged_log_is_refused_on_request(written, broken):
     path = written("zstd")
     words = broken(path)
     with pytest.raises(LogError, match=rf"^run\.mcap: damaged, which `strict` refuses: .*{words}"):

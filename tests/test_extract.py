@@ -67,7 +67,7 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
     assert np.abs(d.force_n[quiet].mean(axis=0)).max() < 0.05
 
 
-def test_a_threshold_within_the_noise_is_told(make):
+def test_a_threshold_within_the_noise_is_reported(make):
     settings = ExtractSettings(push=PushSettings(begins_n=0.2))
     (note,) = extract(make(), settings).notes
     assert note.startswith("run.mcap: without contact the force varies by 0.0")
@@ -85,7 +85,7 @@ def test_a_deflected_joystick_makes_a_joystick_trial(make):
     assert (d.condition, d.corrected) == (Condition.JOYSTICK, True)
 
 
-def test_the_session_record_says_participant_cycle_and_condition(make):
+def test_the_session_record_gives_participant_cycle_and_condition(make):
     entry = {"t_ns": START_NS + 1_500_000_000, "cycle": 2, "condition": "force"}
     d = one(make(session={"participant": "ann", "trials": json.dumps([entry])}))
     assert (d.id, d.cycle, d.condition) == ("ann/1", 2, Condition.FORCE)
@@ -93,12 +93,12 @@ def test_the_session_record_says_participant_cycle_and_condition(make):
 
 
 @pytest.mark.parametrize("trials", ["no json", '{"t_ns": 1}', '[{"cycle": 1}]', "[1]"])
-def test_a_broken_session_record_is_told(make, trials):
+def test_a_broken_session_record_is_reported(make, trials):
     with pytest.raises(LogError, match=r"run\.mcap: metadata record navirl\.session, key trials: expected a JSON list"):
         make(session={"trials": trials})
 
 
-def test_an_unknown_condition_is_told_and_the_trial_skipped(make):
+def test_an_unknown_condition_is_reported_and_the_trial_skipped(make):
     entry = {"t_ns": START_NS, "condition": "telepathy"}
     with pytest.raises(
         DemonstrationError,
@@ -107,12 +107,12 @@ def test_an_unknown_condition_is_told_and_the_trial_skipped(make):
         extract(make(session={"trials": json.dumps([entry])}), ExtractSettings())
 
 
-def test_saying_the_same_goal_again_starts_no_trial(make):
+def test_announcing_the_same_goal_again_starts_no_trial(make):
     goals = ((1.5, 4.0, 0.0), (4.0, 4.0, 0.01), (6.0, 4.01, 0.0))
     assert len(trials_of(make(goals=goals), Split.GOAL)) == 1
 
 
-def test_a_new_goal_on_the_way_starts_a_trial(make):
+def test_a_new_goal_during_a_drive_starts_a_trial(make):
     extraction = extract(make(goals=((1.5, 4.0, 1.0), (7.0, 4.0, 0.0))), ExtractSettings())
     first, second = extraction.demonstrations
     assert first.xy_m[-1, 0] == pytest.approx(2.0, abs=0.05)
@@ -122,7 +122,7 @@ def test_a_new_goal_on_the_way_starts_a_trial(make):
     assert [d.id for d in extraction.demonstrations] == ["run/1", "run/2"]
 
 
-def test_a_goal_that_cannot_be_reached_is_told(make):
+def test_a_goal_that_cannot_be_reached_is_reported(make):
     for goal in ((1.5, 40.0, 0.0), (1.5, 3.0, 1.2)):
         walls = tuple((column, 25) for column in range(60))
         with pytest.raises(DemonstrationError, match=r"goal unreachable: no free path on the map from x -?0\.00 m"):
@@ -139,7 +139,7 @@ def test_splits_at_rests_and_none(make):
     assert d.goal_m == pytest.approx((LENGTH_M, 0.0))
 
 
-def test_goal_and_people_can_be_said(make):
+def test_goal_and_people_can_be_given(make):
     d = one(make(goals=(), people=None), goal_m=(4.0, 0.0), people_m=((2.0, -1.0), (1.0, 1.0)))
     assert d.goal_m == (4.0, 0.0)
     assert d.people_m.tolist() == [[2.0, -1.0], [1.0, 1.0]]
@@ -147,26 +147,26 @@ def test_goal_and_people_can_be_said(make):
     assert "no people in the scene; give their places with `person` x,y" in one(make(people=None)).notes
 
 
-def test_without_goals_the_error_says_what_to_do(make):
+def test_without_goals_the_error_gives_the_remedy(make):
     with pytest.raises(DemonstrationError, match=r"no goal is announced.* `goal` x,y, or choose `split` stop"):
         extract(make(goals=()), ExtractSettings())
 
 
 def test_driven_cells_that_the_map_calls_occupied_are_freed_and_counted(make):
-    # A wall of one cell 0.2 m beside the way: grown by 0.3 m it covers the way.
+    # a wall of one cell 0.2 m beside the path: grown by 0.3 m it covers the path
     recording = make(obstacles=((30, 17),))
     d = one(recording)
     walled = one(recording, robot_radius_m=0.05)
     assert walled.notes == ()
     (note,) = d.notes
     count = int(note.split()[0])
-    # Of the way's cells those nearer than 0.3 m to it: |dx| < sqrt(0.05) = 0.22 m.
+    # of the path's cells those nearer than 0.3 m to it: |dx| < sqrt(0.05) = 0.22 m.
     assert note == f"{count} driven cells that are occupied on the map were freed"
     assert count == 5
     assert not d.grid.is_occupied(d.cells).any()
 
 
-def test_a_loop_that_the_rule_cuts_off_is_told(make):
+def test_a_loop_that_the_rule_leaves_out_is_reported(make):
     recording = make()
     turn = np.linspace(0, 2 * np.pi, 60)
     loop = np.stack([2 + 0.7 * np.sin(turn), 0.7 - 0.7 * np.cos(turn)], axis=1)
@@ -192,7 +192,7 @@ def test_a_robot_that_does_not_move_is_an_empty_trial(make):
         extract(make(moves=False), ExtractSettings())
 
 
-def test_a_path_beyond_the_map_is_told(make):
+def test_a_path_beyond_the_map_is_reported(make):
     recording = make()
     small = replace(recording.occupancy, data=recording.occupancy.data[:, :30])
     with pytest.raises(DemonstrationError, match=r"cells of the path lie beyond the map, the first at x 2\.00 m"):
@@ -220,7 +220,7 @@ def test_numbers_go_on_over_the_logs_of_a_participant(make):
     assert [d.id for d in found] == ["run/1", "eve/1", "run/4"]
 
 
-def test_a_hole_in_the_poses_or_the_wrench_is_no_trial(make):
+def test_a_trial_with_a_gap_in_poses_or_wrench_is_refused(make):
     recording = make()
     seconds = (recording.t_ns - START_NS) / 1e9
     keep = (seconds < 5) | (seconds > 7.5)
@@ -240,7 +240,7 @@ def test_a_hole_in_the_poses_or_the_wrench_is_no_trial(make):
     assert note == "run.mcap: gaps of more than 0.1 s in the wrench: 1; the force is interpolated linearly"
 
 
-def test_wrench_and_poses_of_different_clocks_are_told(make):
+def test_wrench_and_poses_of_different_clocks_are_reported(make):
     recording = make()
     late = replace(recording.wrench, t_ns=recording.wrench.t_ns + 10**18)
     with pytest.raises(LogError, match=r"wrench and poses share no time: .* \+1000000000 s from the poses"):
@@ -269,19 +269,19 @@ def test_the_same_goal_again_after_the_robot_was_there_starts_a_trial(make):
     assert way[again.stop - 1] == pytest.approx([4.0, 0.0], abs=0.05)
 
 
-def test_a_goal_said_by_the_user_replaces_the_logs(make):
+def test_a_goal_of_the_user_replaces_the_logs(make):
     d = one(make(goals=((1.5, 1.0, 1.0),)), goal_m=(4.0, 0.0))
     assert d.goal_m == (4.0, 0.0)
     assert d.notes == ()
 
 
-def test_a_map_that_denies_the_drive_is_told(make):
+def test_a_map_with_occupied_cells_on_the_path_is_reported(make):
     wall = tuple((column, 15) for column in range(20, 45))
     with pytest.raises(DemonstrationError, match=r"\d+ of 41 driven cells are occupied on the map grown by 0\.3 m"):
         extract(make(obstacles=wall), ExtractSettings())
 
 
-def test_people_where_none_can_stand_are_noted(make):
+def test_people_in_a_wall_or_off_the_map_are_noted(make):
     d = one(make(obstacles=((30, 27),)), people_m=((1.95 + 0.03, 1.2), (90.0, 0.0)))
     assert d.notes == (
         "a person at x 1.98 m, y 1.20 m stands in a wall of the map",

@@ -1,4 +1,4 @@
-"""How fast a robot gives way to a push: known gains found again, with errors that tell how well."""
+"""How fast a robot gives way to a push: known gains are found again, with matching standard errors."""
 
 import json
 from dataclasses import replace
@@ -50,7 +50,7 @@ def pushed():
 
 
 @pytest.mark.parametrize("odometry", [True, False])
-def test_a_robot_that_gives_way_and_nothing_else(recording, odometry):
+def test_a_robot_that_only_gives_way(recording, odometry):
     seconds = (recording.t_ns - recording.t_ns[0]) / 1e9
     gain = of(replace(recording, velocity_m_s=velocity_m_s(PUSHED, seconds) if odometry else None))
     assert gain.gain_m_s_n == pytest.approx(K, rel=0.01)
@@ -61,7 +61,7 @@ def test_a_robot_that_gives_way_and_nothing_else(recording, odometry):
 
 def test_a_robot_that_turns_gives_way_to_its_own_left(recording):
     spun = replace(recording, yaw_rad=recording.yaw_rad + np.pi / 2, velocity_m_s=None)
-    # What was ahead is to the right now: the base's left is the way back, along which nobody gives way.
+    # ahead has become right: the base's left points back, along which the robot does not give way
     assert abs(of(spun).gain_m_s_n) < 0.2 * K
 
 
@@ -82,11 +82,11 @@ def test_a_navigation_that_pulls_back_does_not_make_the_gain_small(recording):
         moved += 0.01 * velocity[-1]
     gain = of(sideways(recording, np.array(velocity)))
     assert gain.gain_m_s_n == pytest.approx(K, rel=0.03)
-    # The plain regression of the velocity on the force, which knows nothing of it, fails.
+    # The plain regression of the velocity on the force, which ignores it, fails.
     assert np.dot(force, velocity) / np.dot(force, force) < 0.9 * K
 
 
-def test_errors_are_as_large_as_they_are_said_to_be(recording):
+def test_standard_errors_match_the_errors(recording):
     rng = np.random.default_rng(7)
     misses = []
     pushes = pushes_of(recording, PushSettings())
@@ -177,7 +177,7 @@ def test_extract_prints_and_writes_the_gain(navirl, tmp_path):
     assert [line.split()[0] for line in single[4:]] == ["a.mcap"]
 
 
-def test_extract_without_a_push_says_so(navirl, tmp_path):
+def test_extract_without_a_push_reports_it(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(pushes=()))
     result = navirl("extract", log, "-o", "demos.json", "--gain")
     assert len(result.stdout.splitlines()) == 2

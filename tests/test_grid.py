@@ -1,4 +1,4 @@
-"""Occupancy grids: geometry, growth, resampling, and what ROS occupancy means."""
+"""Occupancy grids: geometry, growth, resampling, and the meaning of ROS occupancy."""
 
 from math import acos, hypot
 
@@ -90,7 +90,7 @@ def test_inflation_against_every_pair_of_cells(occupied, radius_m):
         assert grown.occupied[row, column] == (occupied[row, column] or near)
 
 
-def test_inflation_by_nothing_and_of_nothing_changes_nothing():
+def test_inflation_by_zero_and_of_free_maps_changes_no_cell():
     grid = make.grid_of("..#")
     assert grid.inflated(0.0) is grid
     empty = make.open_grid(4, 4)
@@ -185,7 +185,7 @@ def test_freeing_the_driven_cells_leaves_the_original_alone():
     assert grid.occupied.all()
 
 
-def test_freeing_beyond_the_map_says_where_and_what_the_map_spans():
+def test_freeing_beyond_the_map_is_refused_with_place_and_extent():
     with pytest.raises(
         GridError,
         match=r"2 cells of the path lie beyond the map, the first at x 0\.35 m, y 0\.05 m; "

@@ -1,4 +1,4 @@
-"""navirl import-study: archives and folders in, logs out, and what is lost is told."""
+"""navirl import-study: archives and folders in, logs out, and losses are reported."""
 
 import json
 import shutil
@@ -64,7 +64,7 @@ def test_one_participants_folder_and_json(navirl, study):
     }
 
 
-def test_what_is_lost_is_told_and_the_rest_is_written(navirl, study):
+def test_what_is_lost_is_reported_and_the_rest_is_written(navirl, study):
     (study / "runs" / "p1" / "joystick_demos.pkl").write_bytes(b"cos\nsystem\n(S'true'\ntR.")
     write(study / "runs" / "p3", {"force_demos.pkl": b"hello"})
     (study / "runs" / "p2" / "force_parcours_times.txt").unlink()
@@ -74,21 +74,21 @@ def test_what_is_lost_is_told_and_the_rest_is_written(navirl, study):
     broken, missing, nothing = result.stderr.splitlines()
     assert broken == (
         "navirl: runs/p1/joystick_demos.pkl: expected only names that the published study needs, found os.system "
-        "before byte 11; nothing was run; fetch the file from its authors anew"
+        "before byte 11; no code was run; download the file from its authors again"
     )
     assert missing == (
-        "navirl: runs/p2: expected force_parcours_times.txt, joystick_parcours_times.txt too, found none; what they "
-        "hold is left out"
+        "navirl: runs/p2: expected force_parcours_times.txt, joystick_parcours_times.txt too, found no such files; "
+        "their data are left out"
     )
     assert nothing == (
         "navirl: runs/p3: expected demonstrations and a map, found none: runs/p3/force_demos.pkl: expected a pickle of "
-        "protocol 0, as the study is published, found operation 'h' before byte 1 of 5; fetch the file from its "
-        "authors anew (and 1 more)"
+        "protocol 0, as the study is published, found operation 'h' before byte 1 of 5; download the file from its "
+        "authors again (and 1 more)"
     )
     assert "p2.mcap      10  not known" in result.stdout
 
 
-def test_nothing_usable_is_known_trouble(navirl, study):
+def test_no_usable_data_is_an_expected_error(navirl, study):
     shutil.rmtree(study / "runs")
     write(study / "runs" / "p3", {"force_demos.pkl": b"hello"})
     result = navirl("import-study", "runs", "-o", "logs", code=1)
@@ -109,7 +109,7 @@ def test_logs_are_not_overwritten_unless_forced(navirl, study):
 
 
 @pytest.mark.usefixtures("study")
-def test_a_folder_that_cannot_be_made_is_told(navirl):
+def test_a_folder_that_cannot_be_made_is_reported(navirl):
     result = navirl("import-study", "runs", "-o", "runs.tar.gz", code=1)
     assert result.stderr == "navirl: runs.tar.gz: cannot be made a folder: File exists; choose another --output\n"
 
@@ -119,7 +119,7 @@ def test_a_damaged_archive_is_refused(navirl, study):
     (study / "runs.tar.gz").write_bytes(whole[: len(whole) // 2])
     result = navirl("import-study", "runs.tar.gz", "-o", "logs", code=1)
     assert result.stderr.startswith(
-        "navirl: runs.tar.gz: expected a whole tar archive of the study (runs.tar.gz), found "
+        "navirl: runs.tar.gz: expected an intact tar archive of the study (runs.tar.gz), found "
     )
 
 

@@ -1,4 +1,4 @@
-"""``navirl inspect``: what logs hold, as text and as JSON, sound or not."""
+"""``navirl inspect``: the content of logs, intact or damaged, as text and as JSON."""
 
 import json
 from pathlib import Path
@@ -63,7 +63,7 @@ SCHEMA = many(
 
 @pytest.fixture
 def inspect(navirl):
-    """Run the command; its JSON, which must be as the schema says, and its diagnostics."""
+    """Run the command; its JSON, which must match the schema, and its diagnostics."""
 
     def run(*words, code=0):
         result = navirl("inspect", "--json", *words, code=code)
@@ -90,7 +90,7 @@ def rows_of(text, first):
     return found
 
 
-# sound logs
+# intact logs
 
 
 def test_a_sample_log_as_text(navirl):
@@ -124,7 +124,7 @@ def test_a_sample_log_as_json(inspect):
 
 
 @pytest.mark.parametrize("way", ["zstd", "no summary", "no summary, no chunks", "uncompressed chunks"])
-def test_every_way_of_writing_looks_alike(inspect, tmp_path, way):
+def test_every_encoding_gives_the_same_overview(inspect, tmp_path, way):
     views = []
     for name, options in (("a.mcap", {}), ("b.mcap", forge.WAYS[way])):
         (view,), _ = inspect(nav.drive(8.0).write(tmp_path / name, **options))
@@ -165,7 +165,7 @@ def test_what_extract_would_take_follows_the_users_choice(inspect, navirl, tmp_p
     )
 
 
-def test_what_is_missing_is_told_with_what_supplies_it(inspect, navirl, tmp_path):
+def test_missing_topics_are_reported_with_the_remedy(inspect, navirl, tmp_path):
     log = nav.Log()
     log.messages = [nav.Message("/scan", "sensor_msgs/msg/LaserScan", nav.START_NS, b"")]
     path = log.write(tmp_path / "run.mcap")
@@ -200,7 +200,7 @@ def test_no_messages_at_all(inspect, navirl, tmp_path):
 # gaps
 
 
-def test_gaps_of_regular_topics_are_counted(inspect, navirl, tmp_path):
+def test_gaps_of_regular_topics_are_reported(inspect, navirl, tmp_path):
     log = nav.drive(20.0)
     quiet = [(5.0, 8.5), (12.0, 12.7)]
     log.messages = [
@@ -208,7 +208,7 @@ def test_gaps_of_regular_topics_are_counted(inspect, navirl, tmp_path):
         for one in log.messages
         if one.topic != "/odom" or not any(a < (one.log_time_ns - nav.START_NS) / 1e9 < b for a, b in quiet)
     ]
-    for second in (1.0, 2.0, 3.0, 19.0):  # what is said now and then may be silent
+    for second in (1.0, 2.0, 3.0, 19.0):  # an irregular topic has no gaps
         log.add("/goal_pose", nav.pose_stamped(nav.unix(second), 1.0, 1.0), nav.unix(second))
     path = log.write(tmp_path / "run.mcap")
     (view,), _ = inspect(path)
@@ -250,9 +250,9 @@ def clocks_of(inspect, tmp_path, **clocks):
     return view["clocks"], {topic: flow["stamp_minus_receipt_s"] for topic, flow in topics_of(view).items()}
 
 
-def test_sound_clocks_need_no_word(inspect, tmp_path):
-    said, offsets = clocks_of(inspect, tmp_path)
-    assert said == []
+def test_intact_clocks_give_no_notes(inspect, tmp_path):
+    notes, offsets = clocks_of(inspect, tmp_path)
+    assert notes == []
     assert offsets == {
         "/map": None,
         "/odom": pytest.approx(0, abs=0.005),
@@ -261,39 +261,39 @@ def test_sound_clocks_need_no_word(inspect, tmp_path):
     }
 
 
-def test_simulated_stamps_are_told(inspect, navirl, tmp_path):
+def test_simulated_stamps_are_reported(inspect, navirl, tmp_path):
     clock = nav.simulated(928.8)
-    said, offsets = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
-    (note,) = said
+    notes, offsets = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
+    (note,) = notes
     assert "/odom begins at 928.80 s; extract goes by the stamps, unless `time` log" in note
     assert offsets["/wrench"] == pytest.approx(928.8 - nav.START_NS / 1e9, abs=0.01)
     assert f"\n- clock: {as_options(note)}\n" in navirl("inspect", tmp_path / "run.mcap").stdout
 
 
-def test_another_computers_clock_is_told(inspect, tmp_path):
-    said, offsets = clocks_of(inspect, tmp_path, wrench_clock=nav.off(3.0))
-    (note,) = said
+def test_another_computers_clock_is_reported(inspect, tmp_path):
+    notes, offsets = clocks_of(inspect, tmp_path, wrench_clock=nav.off(3.0))
+    (note,) = notes
     assert note.startswith(
         "in the first messages: /wrench is stamped by another clock than /odom: +3.000 s by the times of receipt"
     )
     assert offsets["/wrench"] == pytest.approx(3.0, abs=0.01)
 
 
-def test_a_recorder_whose_clock_is_off_is_told(inspect, tmp_path):
+def test_a_recorder_whose_clock_is_off_is_reported(inspect, tmp_path):
     clock = nav.off(-7.5)
-    said, _ = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
-    (note,) = said
+    notes, _ = clocks_of(inspect, tmp_path, odom=clock, wrench_clock=clock, tf_clock=clock)
+    (note,) = notes
     assert note.startswith("header stamps of /odom differ by -7.50")
     assert note.endswith(" s from the recorder's clock; extract goes by the stamps, unless `time` log")
 
 
-def test_stamps_of_0_are_told(inspect, tmp_path):
-    said, offsets = clocks_of(inspect, tmp_path, odom=nav.never, wrench_clock=nav.never, tf_clock=nav.never)
-    assert said == ["in the first messages: no message on /odom has a stamp; times of receipt are used"]
+def test_stamps_of_0_are_reported(inspect, tmp_path):
+    notes, offsets = clocks_of(inspect, tmp_path, odom=nav.never, wrench_clock=nav.never, tf_clock=nav.never)
+    assert notes == ["in the first messages: no message on /odom has a stamp; times of receipt are used"]
     assert set(offsets.values()) == {None}
 
 
-def test_clocks_are_told_apart_though_every_chunk_holds_few_messages(inspect, tmp_path):
+def test_clocks_are_distinguished_though_every_chunk_holds_few_messages(inspect, tmp_path):
     log = nav.drive(20.0, wrench_clock=nav.off(3.0))
     path = log.write(tmp_path / "run.mcap", chunk_size=3000)
     assert len(forge.chunk_starts(path)) > 100
@@ -338,7 +338,7 @@ def test_only_a_check_looks_inside_of_chunks(inspect, tmp_path):
     assert topics_of(checked) == topics_of(view)
 
 
-def test_a_check_of_a_sound_log_finds_nothing(inspect, tmp_path):
+def test_a_check_of_an_intact_log_finds_no_damage(inspect, tmp_path):
     path = nav.drive(8.0).write(tmp_path / "run.mcap")
     assert inspect(path, "--check") == inspect(path)
 
@@ -358,7 +358,7 @@ def test_several_logs_and_a_folder(inspect, navirl, tmp_path):
     assert [part.partition(":")[0] for part in parts if ".mcap:" in part] == ["z.mcap", "a.mcap", "b.mcap"]
 
 
-def test_one_log_that_is_none_does_not_hide_the_others(inspect, navirl, tmp_path):
+def test_an_invalid_log_does_not_hide_the_others(inspect, navirl, tmp_path):
     good = nav.drive(4.0).write(tmp_path / "good.mcap")
     (tmp_path / "bad.mcap").write_bytes(b"\x89MCA")
     views, errors = inspect(tmp_path / "bad.mcap", good, code=3)
@@ -376,7 +376,7 @@ def test_what_is_no_log(navirl, tmp_path):
     assert "Missing argument 'LOGS" in navirl("inspect", code=2).stderr
 
 
-def test_a_date_that_is_none(inspect, navirl, tmp_path):
+def test_a_time_that_is_not_a_date(inspect, navirl, tmp_path):
     log = nav.Log()
     for t_ns in (5 * 10**9, 7 * 10**9):
         log.add("/odom", nav.odometry(t_ns, 0.0, 0.0), t_ns)
@@ -390,7 +390,7 @@ def test_a_date_that_is_none(inspect, navirl, tmp_path):
 
 
 @nav.needs_real
-def test_a_real_logs_clocks_are_told_apart(inspect, navirl):
+def test_a_real_logs_clocks_are_distinguished(inspect, navirl):
     text = navirl("inspect", nav.REAL).stdout
     assert "\n- 2026-05-08 09:59:13 UTC, 97.4 s, 8197 messages\n" in text
     assert "/odom begins at 928.80 s; extract goes by the stamps" in text

@@ -1,4 +1,4 @@
-"""A log's columns on one clock and in one frame, and what is done with numbers that are none."""
+"""A log's columns on one clock and in one frame, and without implausible numbers."""
 
 import json
 from dataclasses import replace
@@ -49,7 +49,7 @@ def test_where_an_axis_rests_is_no_deflection(load):
     assert condition_of(load(joystick="still", stick_rest=float("nan"))) is Condition.FORCE
 
 
-def test_poses_that_are_none_are_left_out_and_counted(load):
+def test_implausible_poses_are_left_out_and_counted(load):
     recording = load(odometry_nan=3, odometry_zero=4)
     assert recording.damage == (
         "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 without a rotation); left out",
@@ -60,7 +60,7 @@ def test_poses_that_are_none_are_left_out_and_counted(load):
         load(odometry_nan=1000)
 
 
-def test_forces_that_are_none_are_left_out_and_counted(load):
+def test_implausible_forces_are_left_out_and_counted(load):
     recording = load(wrench_nan=5)
     assert np.isfinite(recording.wrench.force_n).all()
     assert recording.damage == ("run.mcap: 5 messages on /wrench hold implausible values (5 not finite); left out",)
@@ -90,7 +90,7 @@ def test_people_in_an_unknown_frame_do_not_spoil_the_log(load):
     assert recording.people == ()
 
 
-def test_goals_that_are_none_are_left_out(load):
+def test_goals_that_are_not_finite_are_left_out(load):
     recording = load(goals=((1.0, float("nan"), 0.0), (1.5, 4.0, 0.0)))
     assert len(recording.goal_t_ns) == 1
     assert "1 messages on /goal_pose left out: its numbers are not finite" in recording.damage[0]
@@ -104,7 +104,7 @@ def test_goals_that_are_none_are_left_out(load):
         ({"resolution_m": float("nan")}, "run.mcap: expected a map with a positive resolution"),
     ],
 )
-def test_maps_that_are_none_are_refused(load, changes, message):
+def test_invalid_maps_are_refused(load, changes, message):
     with pytest.raises(LogError, match=message):
         load(**changes)
 

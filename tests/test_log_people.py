@@ -1,4 +1,4 @@
-"""People as every kind of message tells them, through files and into the map's frame."""
+"""People from every message type, through files and into the map's frame."""
 
 import json
 
@@ -40,8 +40,8 @@ def check_still(track, xy_m=(3.0, 1.0), times=SEEN_S):
     assert track.xy_m == pytest.approx(np.tile(xy_m, (len(times), 1)))
 
 
-#: Messages that tell of a walker and of one who stands, and what the two are called.
-KINDS = {
+#: Messages with a walker and a person who stands, and the names of the two.
+TYPES = {
     "people_msgs": (lambda t, s: nav.people(t, [("ann", *walker(s)), ("bob", 3, 1)]), "ann", "bob"),
     "spencer": (lambda t, s: nav.tracked(t, [(7, *walker(s)), (2**53 + 1, 3, 1)]), "7", "9007199254740993"),
     "hunav": (lambda t, s: nav.agents(t, [(4, 1, *walker(s)), (9, 2, 8, 8), (5, 1, 3, 1)]), "4", "5"),
@@ -50,9 +50,9 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_list_of_people_becomes_tracks(load, kind):
-    make, walking, standing = KINDS[kind]
+@pytest.mark.parametrize("name", TYPES)
+def test_every_list_of_people_becomes_tracks(load, name):
+    make, walking, standing = TYPES[name]
     recording = load(lambda t, s: {"/people": make(t, s)})
     assert recording.damage == recording.notes == ()
     assert [track.name for track in recording.people] == [walking, standing]
@@ -77,7 +77,7 @@ def test_a_single_topic_of_one_person(load):
     check_walker(recording.people[0])
 
 
-def test_who_comes_and_goes_keeps_the_name(load):
+def test_a_person_who_comes_and_goes_keeps_the_name(load):
     def say(t, s):
         named = [("ann", *walker(s))] * (2 <= s < 5) + [("bob", 3, 1)] * (s < 4)
         return {"/people": nav.people(t, named)}
@@ -86,11 +86,11 @@ def test_who_comes_and_goes_keeps_the_name(load):
     assert [track.name for track in recording.people] == ["bob", "ann"]
     check_still(recording.people[0], times=SEEN_S[SEEN_S < 4])
     check_walker(recording.people[1], SEEN_S[(SEEN_S >= 2) & (SEEN_S < 5)])
-    # messages that name nobody say that nobody is there
+    # messages without people mean that the scene is empty
     assert recording.people_t_ns.tolist() == nav.unix(SEEN_S).tolist()
 
 
-def test_nobody_is_somebody_too(load):
+def test_messages_without_people_are_kept(load):
     recording = load(lambda t, _: {"/people": nav.people(t, [])})
     assert recording.people == ()
     assert recording.people_t_ns.tolist() == nav.unix(SEEN_S).tolist()
@@ -98,7 +98,7 @@ def test_nobody_is_somebody_too(load):
 
 
 @pytest.mark.parametrize("names", [("", ""), ("ann", ""), ("person", "person")])
-def test_names_that_tell_nobody_apart_are_replaced_by_places(load, names):
+def test_names_that_are_not_unique_are_replaced_by_places(load, names):
     recording = load(lambda t, s: {"/people": nav.people(t, [(names[0], *walker(s)), (names[1], 3, 1)])})
     assert [track.name for track in recording.people] == ["1", "2"]
     check_walker(recording.people[0])
@@ -131,7 +131,7 @@ def test_people_as_json_keep_long_numbers_apart(tmp_path):
 def test_only_markers_of_bodies_that_are_added_are_people(load):
     def say(t, s):
         listed = [
-            nav.marker(0, 0, 0, 0, frame="", action=3),  # first of all, RViz is told to forget everything
+            nav.marker(0, 0, 0, 0, frame="", action=3),  # first of all, RViz is asked to delete all markers
             nav.marker(t, 1, *walker(s), kind=3),
             nav.marker(t, 1, *walker(s), kind=9, space="name"),
             nav.marker(t, 1, *walker(s), kind=0, space="velocity"),
@@ -187,7 +187,7 @@ def test_slashes_before_frames_do_not_matter(load, frame):
     check_walker(recording.people[0])
 
 
-def test_who_was_seen_before_tf_spoke_is_placed_by_its_first_word(load):
+def test_people_seen_before_the_first_transform_are_placed_by_it(load):
     seconds = np.array([-3600.0, 0.0])
     recording = load(
         lambda t, _: {"/people": nav.people(t, [("ann", 2.0, 1.0)], frame="odom")}, seconds, late_ns=3601 * 10**9
@@ -203,7 +203,7 @@ def test_people_without_stamps_count_from_their_receipt(load):
     assert recording.people[0].xy_m[:, 0] == pytest.approx(1.0 + WALK_M_S * SEEN_S)
 
 
-def test_a_message_that_repeats_a_time_says_nothing_new(load):
+def test_a_message_that_repeats_a_time_is_ignored(load):
     seconds = np.repeat(SEEN_S, 2)
     recording = load(lambda t, s: {"/people": nav.people(t, [("ann", *walker(s))])}, seconds)
     check_walker(recording.people[0])

@@ -53,7 +53,7 @@ def slow_map(pixels, full, *, mode="trinary", negate=False, occupied=0.65, free=
 
 
 def picture(rng, kind):
-    """An image of every kind that Pillow has for maps, and its pixels as the slow twin takes them."""
+    """An image of every mode that Pillow has for maps, and its pixels as the slow twin takes them."""
     rows, columns = rng.integers(1, 12, 2)
     grey = rng.integers(0, 256, (rows, columns), dtype=np.uint8)
     # most pixels of a map have one of few colours, and opaque ones must be there

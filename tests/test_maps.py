@@ -1,4 +1,4 @@
-"""The map of a recording comes into the fixed frame as it is, or is refused."""
+"""The map of a recording is brought into the fixed frame without resampling, or refused."""
 
 import tracemalloc
 from dataclasses import replace
@@ -120,7 +120,7 @@ def test_numbers_that_contradict_each_other(load, field, value, message):
         load(grid)
 
 
-def test_an_origin_that_is_none_and_a_map_without_cells(load):
+def test_an_infinite_origin_and_a_map_without_cells(load):
     grid = drawn(origin=(np.nan, 0.0))
     with pytest.raises(
         LogError, match=r"a finite origin, found 0.05\d* m and \(nan, 0.0\); record the map again, or give"

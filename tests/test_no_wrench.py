@@ -1,4 +1,4 @@
-"""Logs without a wrench: contact is unknown, and whatever needs it says so."""
+"""Logs without a wrench: contact is unknown, and all that needs it is refused."""
 
 import json
 from dataclasses import replace
@@ -42,7 +42,7 @@ def test_an_optional_wrench_is_taken_where_there_is_one(tmp_path):
     assert len(needed.contacts) == 1
 
 
-def test_which_of_two_wrenches_is_the_users_choice_though_none_is_needed(tmp_path):
+def test_the_user_chooses_between_two_wrenches_also_where_wrenches_are_optional(tmp_path):
     with pytest.raises(LogError, match=r"several topics could be the wrench .* choose one with `topic` wrench=/arm"):
         loaded(tmp_path, Run(wrench_topics=("/wrench", "/arm")), Forces.OPTIONAL)
     assert load_recording(tmp_path / "run.mcap", LoadOptions(forces=Forces.IGNORED)).wrench is None

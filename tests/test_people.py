@@ -1,4 +1,4 @@
-"""Where the people of a trial are: standing, walking, lost and numbered anew, or no people at all."""
+"""Where the people of a trial are: standing, walking, lost and numbered again, or no people."""
 
 import numpy as np
 import pytest
@@ -79,31 +79,31 @@ def test_who_walks_has_a_track_and_the_mean_over_time_stands_for_them():
 
 
 @pytest.mark.parametrize(("width", "tracks", "notes"), [(0.08, 0, 0), (0.3, 1, 0), (0.7, 1, 1)])
-def test_how_far_one_moves_decides_what_is_told(width, tracks, notes):
+def test_notes_depend_on_how_far_a_person_moves(width, tracks, notes):
     found = seen({"1": walking((0, 0), (width, 0))})
     assert (len(found.tracks), len(found.notes)) == (tracks, notes)
 
 
-def test_only_what_is_said_during_the_trial_counts():
+def test_only_messages_during_the_trial_count():
     found = seen({"1": [*standing(0, 0, 80, 100), *standing(3, 3), *standing(9, 9, 111, 130)]})
     assert found.people_m.tolist() == [[3.0, 3.0]]
 
 
 def test_a_topic_that_speaks_once_holds_for_later_trials():
     assert seen({"1": [(10, 1, 2)], "2": [(10, 3, 4)]}).people_m.tolist() == [[1, 2], [3, 4]]
-    # Of the messages before the trial the last one counts, also where it names nobody.
+    # of the messages before the trial the last one counts, also without people
     assert seen({"1": [(10, 1, 2)], "2": [(20, 3, 4)]}).people_m.tolist() == [[3, 4]]
     assert seen({"1": [(10, 1, 2)]}, messages_s=[10, 20]).people_m.shape == (0, 2)
     assert seen({"1": [(200, 1, 2), (201, 8, 8)]}).people_m.tolist() == [[1, 2]]
     assert seen({}).people_m.shape == (0, 2)
 
 
-def test_messages_that_name_nobody_say_that_nobody_is_there():
+def test_messages_without_people_mean_that_the_scene_is_empty():
     found = seen({"1": standing(1, 1, 80, 99)}, messages_s=np.arange(80, 112, 0.5))
     assert found.people_m.shape == (0, 2)
 
 
-def test_a_ghost_of_the_tracker_does_not_count():
+def test_a_false_track_does_not_count():
     found = seen({"1": standing(1, 1), "7": standing(4, 4, 103, 104.5), "9": standing(2, 4, 106, 106.4)})
     assert found.people_m.tolist() == [[1.0, 1.0], [4.0, 4.0]]
     assert found.notes == ("left out, because seen in less than 20% of the time: person 9",)
@@ -111,14 +111,14 @@ def test_a_ghost_of_the_tracker_does_not_count():
     assert both.notes == ("left out, because seen in less than 20% of the time: person 7, 9",)
 
 
-def test_topics_about_one_person_each_make_no_ghosts():
+def test_topics_about_one_person_each_give_no_false_tracks():
     names = [f"/person{number}" for number in range(8)]
     found = seen({name: standing(number, 2, 100 + 0.01 * number) for number, name in enumerate(names)})
     assert len(found.people_m) == 8
     assert found.notes == ()
 
 
-def test_who_is_lost_and_numbered_anew_is_one_person():
+def test_a_person_with_a_new_number_is_one_person():
     way = walking((0, 1), (4, 1))
     found = seen({"3": way[:40], "8": way[42:70], "12": way[70:]})
     (track,) = found.tracks
@@ -153,7 +153,7 @@ def test_one_wrong_sight_does_not_part_a_person():
     assert found.notes == ("left out, because seen in less than 20% of the time: person 1",)
 
 
-def test_tracks_that_are_none_are_refused():
+def test_invalid_tracks_are_refused():
     for times, places, message in (
         (
             [0.0, 1.0],

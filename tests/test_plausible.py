@@ -1,4 +1,4 @@
-"""Numbers that no sensor gave are found and told; rare but honest ones are kept."""
+"""Implausible numbers are found and reported; rare but true ones are kept."""
 
 import nav_log as nav
 import numpy as np
@@ -24,7 +24,7 @@ def forces(n=60):
 
 @pytest.mark.parametrize("number", [*NONE, 2.6e-155, -1e-308, 3000.0])
 @pytest.mark.parametrize("row", [1, 30, 58])
-def test_what_is_no_force_is_found(number, row):
+def test_impossible_forces_are_found(number, row):
     values = forces()
     values[row, 1] = number
     assert np.flatnonzero(~plausible(values, FORCES)).tolist() == [row]
@@ -32,7 +32,7 @@ def test_what_is_no_force_is_found(number, row):
 
 @pytest.mark.parametrize("number", NONE)
 @pytest.mark.parametrize("row", [0, 59])
-def test_the_first_and_the_last_are_looked_at_too(number, row):
+def test_the_first_and_the_last_are_judged_too(number, row):
     values = forces()
     values[row] = number
     assert np.flatnonzero(~plausible(values, FORCES)).tolist() == [row]
@@ -56,7 +56,7 @@ def test_several_wrong_numbers_in_a_row():
         forces() * 5e-17,
         np.random.default_rng(1).choice([0.0, 1e-17, -3e-19, 2e-16], (200, 3)),
         np.outer(np.exp(-np.arange(80.0)), [1.0, 1.0, 1.0]),
-        # what a simulator calls nothing, among something
+        # a simulator's zeros among other values
         np.where(np.arange(60)[:, None] % 4 > 0, forces(), 3e-17),
         # impacts: up within one sample, but of several; up to 900 N, or hanging on
         np.outer(np.r_[np.zeros(20), 600, 900, 700, 200, np.zeros(20)], [1.0, -0.5, 0.1]),
@@ -68,9 +68,9 @@ def test_several_wrong_numbers_in_a_row():
     ],
 )
 def test_honest_forces_are_kept(honest):
-    good, trouble = plausible_messages("/wrench", honest, FORCES)
+    good, problem = plausible_messages("/wrench", honest, FORCES)
     assert good.all()
-    assert trouble == ""
+    assert problem == ""
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
@@ -106,7 +106,7 @@ def test_odometry_and_tf_take_the_same_quaternions(length):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "report"),
     [
         ({(3, 0): np.nan}, "1 messages on /ft hold implausible values (1 not finite); left out"),
         (
@@ -119,25 +119,25 @@ def test_odometry_and_tf_take_the_same_quaternions(length):
         ),
     ],
 )
-def test_what_was_wrong_is_told_by_the_number_that_is(values, said):
+def test_implausible_values_are_reported_with_an_example(values, report):
     measured = forces()
-    measured[3] = 0.0  # an exact zero beside the wrong number is none
+    measured[3] = 0.0  # an exact zero beside the wrong number is not implausible
     for place, number in values.items():
         measured[place] = number
     if (3, 1) in values:
         measured[3, 0] = 0.0
-    good, trouble = plausible_messages("/ft", measured, FORCES)
-    assert trouble == said
+    good, problem = plausible_messages("/ft", measured, FORCES)
+    assert problem == report
     assert (~good).sum() == len({row for row, _ in values})
 
 
-def test_poses_without_a_rotation_are_told_apart():
+def test_poses_without_a_rotation_are_counted_separately():
     values = np.zeros((9, 3))
     values[2, 0], values[4, 0], values[6, 0] = np.nan, 5e6, 7e6
-    turned = np.array([True, False, False, True, True, True, False, True, True])
-    good, trouble = plausible_messages("/odom", values, PLACES, turned)
+    rotations = np.array([True, False, False, True, True, True, False, True, True])
+    good, problem = plausible_messages("/odom", values, PLACES, rotations)
     assert good.tolist() == [True, False, False, True, False, True, False, True, True]
-    assert trouble == (
+    assert problem == (
         "4 messages on /odom hold implausible values (1 not finite, 2 without a rotation, 1 impossible, such as "
         "5e+06 m); left out"
     )
@@ -149,7 +149,7 @@ def test_limits_are_of_the_quantity():
     assert plausible(values, Limits(2.5, 9.0, "m/s")).tolist() == [True, False, True, True]
 
 
-def test_a_flipped_exponent_in_a_file_is_told_and_left_out(tmp_path):
+def test_a_flipped_exponent_in_a_file_is_reported_and_left_out(tmp_path):
     log = nav.drive(6.0)
     rows = [row for row, one in enumerate(log.messages) if one.topic == "/wrench"]
     for number, bit in ((300, 6), (200, 4)):
@@ -170,7 +170,7 @@ def test_a_flipped_exponent_in_a_file_is_told_and_left_out(tmp_path):
 
 
 @pytest.mark.parametrize("number", NONE)
-def test_poses_people_and_goals_that_are_none_do_not_spoil_a_log(tmp_path, number):
+def test_implausible_poses_people_and_goals_do_not_spoil_a_log(tmp_path, number):
     log = nav.drive(6.0)
     log.add("/odom", nav.odometry(int(nav.unix(3.01)), number, 0.0), int(nav.unix(3.01)))
     at = int(nav.unix(1.0))

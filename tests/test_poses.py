@@ -1,4 +1,4 @@
-"""Where the robot was, from every source of poses, through tf that turns, jumps, pauses or is not there."""
+"""Where the robot was, from every source of poses, through tf that rotates, jumps, pauses or is missing."""
 
 import nav_log as nav
 import numpy as np
@@ -214,7 +214,7 @@ def test_of_two_frames_in_turn_the_commoner_one_counts(load):
 # time
 
 
-def test_before_the_localisations_first_word_nobody_knows(load):
+def test_poses_before_the_first_transform_are_left_out(load):
     run = Run().odometry().tf(lambda _: (5.0, 0.0), np.arange(60, 201) / 10)
     recording = load(run)
     check_true(recording, run, run.seconds[run.seconds >= 5.0], (5.0, 0.0))
@@ -243,7 +243,7 @@ def test_stamps_of_another_clock_can_be_set_aside(load):
     check_true(load(run, time=TimeSource.LOG), run, xy_m=(5.0, 0.0))
 
 
-def test_holes_in_tf_are_not_bridged(load):
+def test_long_gaps_in_tf_are_not_interpolated(load):
     quiet = np.arange(201) / 10
     run = (
         Run()
@@ -256,7 +256,7 @@ def test_holes_in_tf_are_not_bridged(load):
     assert recording.damage == ("run.mcap: 139 poses lie in gaps of tf longer than 5 s; left out",)
 
 
-def test_holes_count_where_tf_alone_tells(load):
+def test_gaps_count_where_poses_come_from_tf_alone(load):
     quiet = np.arange(201) / 10
     run = Run().tf(lambda _: (5.0, 0.0), quiet[(quiet <= 8) | (quiet >= 15)])
     run.tf(run.true, parent="odom", child="base_link")
@@ -265,7 +265,7 @@ def test_holes_count_where_tf_alone_tells(load):
     assert recording.damage == ("run.mcap: 69 poses lie in gaps of tf longer than 5 s; left out",)
 
 
-def test_parents_that_change_are_told(load):
+def test_parents_that_change_are_reported(load):
     run = Run().odometry().static(nav.transform(0, "map", "floor", 1.0, 0.0))
     early, late = np.arange(100) / 10, np.arange(100, 200) / 10
     run.tf(lambda _: (5.0, 0.0), early).tf(lambda _: (4.0, 0.0), late, parent="floor")
@@ -349,7 +349,7 @@ def test_a_real_robots_odometry_agrees_with_its_localisation():
     amcl = columns["/amcl_pose"]
     begin, times = int(poses.t_ns[0]), amcl["stamp"]
     both = (times >= begin) & (times <= poses.t_ns[-1])
-    # the first pose was said, and latched, before the recording began
+    # the first pose was published, and latched, before the recording began
     assert (both.sum(), len(both)) == (134, 135)
     at = (times[both] - begin) / 1e9
     placed = np.column_stack([np.interp(at, (poses.t_ns - begin) / 1e9, axis) for axis in poses.xy_m.T])

@@ -1,4 +1,4 @@
-"""The archive: read member by member, whatever somebody put into it; and the folders into which it was unpacked."""
+"""The archive: read member by member, without trust in its content; and the folders into which it was unpacked."""
 
 import bz2
 import gzip
@@ -15,8 +15,9 @@ from navirl_cli.errors import ArtefactError
 from navirl_cli.published import archive
 from navirl_cli.published.runs import DEMONSTRATIONS, EXPECTED, runs_in
 
-WHOLE = (
-    r"^{}: expected a whole tar archive of the study \(runs\.tar\.gz\), found {}; fetch it anew, or name the folder "
+INTACT = (
+    r"^{}: expected an intact tar archive of the study \(runs\.tar\.gz\), found {}; download it again, or give the "
+    "folder "
 )
 FILES = {"runs/7/nav_map.pkl": b"map", "runs/7/params.pkl": b"ignored", "runs/12/force_demos.pkl": b"demos"}
 
@@ -27,7 +28,7 @@ def path(tmp_path):
 
 
 def refused(path, found):
-    return pytest.raises(ArtefactError, match=WHOLE.format(path, found))
+    return pytest.raises(ArtefactError, match=INTACT.format(path, found))
 
 
 def header(name, size, kind=tarfile.REGTYPE):
@@ -69,7 +70,7 @@ def test_a_file_systems_copies_are_no_part_of_the_study(path):
 
 
 @pytest.mark.parametrize("odd", ["../7/nav_map.pkl", "runs/../../7/nav_map.pkl", "/runs/7/nav_map.pkl"])
-def test_members_that_lead_out_are_not_read(path, odd):
+def test_members_that_lead_out_of_the_archive_are_not_read(path, odd):
     path.write_bytes(forge.archive(FILES | {odd: b"from outside"}))
     runs, lost = runs_in(path)
     assert contents(runs)["7"] == {"nav_map.pkl": b"map"}
@@ -134,7 +135,7 @@ def test_headers_in_headers_end_the_reading(path):
 @pytest.mark.parametrize("mode", ["w:gz", "w"])
 def test_every_cut_of_an_archive_is_refused(path, mode):
     whole = forge.archive(FILES, mode)
-    # what follows the first of the two empty blocks holds nothing
+    # the bytes after the first of the two empty blocks do not matter
     stop = len(whole) if mode == "w:gz" else len(whole.rstrip(b"\0")) + 512
     for length in (*range(0, stop, 41), stop - 9):
         path.write_bytes(whole[:length])
@@ -142,7 +143,7 @@ def test_every_cut_of_an_archive_is_refused(path, mode):
             runs_in(path)
 
 
-def test_wrong_bytes_are_told(path):
+def test_wrong_bytes_are_reported(path):
     whole = forge.archive(FILES, "w")
     damaged = bytearray(whole)
     damaged[512 * 2] ^= 1  # the second header's name
@@ -172,7 +173,7 @@ def test_what_is_no_archive_is_refused(path, data, found):
         runs_in(path)
 
 
-def test_damaged_archives_give_files_or_known_trouble(path):
+def test_damaged_archives_give_files_or_an_expected_error(path):
     rng = np.random.default_rng(0)
     outcomes = set()
     for mode in ("w", "w:gz"):
@@ -202,7 +203,7 @@ def test_a_name_that_cannot_be_written_is_left_out(path):
     path.write_bytes(forge.archive(FILES | {"runs/7\n/nav_map.pkl": b"x", "runs/\udcff/nav_map.pkl": b"x"}))
     runs, lost = runs_in(path)
     assert sorted(contents(runs)) == ["12", "7"]
-    assert [line.endswith(": its name cannot be written; left out") for line in lost] == [True, True]
+    assert [line.endswith(": its name is not printable; left out") for line in lost] == [True, True]
     assert all(line.isprintable() for line in lost)
 
 
@@ -237,12 +238,12 @@ def test_what_is_no_plain_file_of_a_folder_is_left_out(tmp_path, monkeypatch):
     assert run.files == {}
     left = sorted([*DEMONSTRATIONS, "nav_map.pkl"])
     assert list(run.lost) == [
-        f"{tmp_path / name}: expected a file of at most 0 MB, found another; left out" for name in left
+        f"{tmp_path / name}: expected a file of at most 0 MB, found something else; left out" for name in left
     ]
 
 
 @pytest.mark.parametrize("kind", ["folder", "archive"])
-def test_without_participants_there_is_nothing_to_import(tmp_path, kind):
+def test_without_participants_the_import_is_refused(tmp_path, kind):
     (tmp_path / "other").mkdir()
     root = tmp_path
     if kind == "archive":
@@ -251,7 +252,7 @@ def test_without_participants_there_is_nothing_to_import(tmp_path, kind):
     with pytest.raises(
         ArtefactError,
         match=rf"^{root}: expected the study's archive \(runs\.tar\.gz\), or the folder into which it was unpacked, "
-        r"with a folder for each participant that holds force_demos\.pkl, found none; give the one or the other$",
+        r"with a folder for each participant that holds force_demos\.pkl, found none; give one of the two$",
     ):
         runs_in(root)
 
@@ -277,6 +278,6 @@ def test_other_compressions_are_named(tmp_path, pack, name):
         runs_in(path)
 
 
-def test_nothing_there_is_said(tmp_path):
-    with pytest.raises(ArtefactError, match=r"nosuch: expected the study's archive or folder, found nothing there"):
+def test_a_missing_path_is_reported(tmp_path):
+    with pytest.raises(ArtefactError, match=r"nosuch: expected the study's archive or folder, found neither"):
         runs_in(tmp_path / "nosuch")

@@ -1,4 +1,4 @@
-"""The log of a published participant: what a robot would have recorded, and no more than was published."""
+"""The log of a published participant: as a robot would have recorded it, with no more than was published."""
 
 import json
 
@@ -173,7 +173,7 @@ def test_the_same_input_gives_the_same_bytes(path, participant, tmp_path):
     assert (tmp_path / "next.mcap").read_bytes() != path.read_bytes()
 
 
-def test_a_map_without_a_ring_says_nothing_of_the_robots_radius(tmp_path):
+def test_a_map_without_a_ring_gives_no_radius_of_the_robot(tmp_path):
     files = forge.participant() | {"nav_map.pkl": forge.dumped(forge.nav_map([0] * 1000))}
     write_log(participant_of(Run("7", "runs/7", files)), 0, tmp_path / "7.mcap", force=False)
     assert "robot_radius_m" not in metadata(tmp_path / "7.mcap")[SESSION_RECORD]
@@ -188,7 +188,7 @@ def test_a_map_without_a_ring_says_nothing_of_the_robots_radius(tmp_path):
         ([0, 99, 0, 0, 0, 0], None),
     ],
 )
-def test_the_ring_around_the_obstacles_tells_the_robots_radius(row, radius_m):
+def test_the_ring_around_the_obstacles_gives_the_robots_radius(row, radius_m):
     assert ring_m(Occupancy(np.array([row], dtype=np.int8), 0.1, (0.0, 0.0))) == radius_m
 
 
@@ -221,7 +221,7 @@ def test_a_robot_that_drives_on_after_standing_keeps_its_heading(participant):
     assert away.max() < 0.5
 
 
-def test_nobody_is_told_where_the_demonstration_has_nobody(demonstrations):
+def test_a_demonstration_without_people_gives_a_scene_without_people(demonstrations):
     assert [len(one.people_m) for one in demonstrations] == [1, 1, 1, 1, 1, 0, 1, 1, 1, 1]
 
 

@@ -1,4 +1,4 @@
-"""What was published of a participant, checked: what does not fit is left out and told by file, list and number."""
+"""The published data of a participant, checked: invalid data are left out and reported by file, list and number."""
 
 import numpy as np
 import published_factory as forge
@@ -36,7 +36,7 @@ def names(found):
     return [path.name for path in found.paths]
 
 
-def test_a_whole_participant():
+def test_a_complete_participant():
     found = read()
     assert found.lost == ()
     assert [(path.name, path.part) for path in found.paths] == ORDER
@@ -90,20 +90,23 @@ def test_completion_times_of_several_courses():
 
 
 @pytest.mark.parametrize("data", [b"", b"fast\n", b"12.5 -1\n", b"nan", b"inf", b"0", b"\xff\xfe1", b"1 " * 9999])
-def test_completion_times_that_are_none_are_told(data):
+def test_invalid_completion_times_are_reported(data):
     found = read({"force_parcours_times.txt": data})
     assert found.completion_s == {"joystick": (16.9999983311,)}
     (line,) = found.lost
     assert (
-        line == f"runs/7/force_parcours_times.txt: expected seconds above 0, found {data[:40]!r}; fetch the file anew"
+        line
+        == f"runs/7/force_parcours_times.txt: expected seconds above 0, found {data[:40]!r}; download the file again"
     )
 
 
-def test_missing_files_are_told_and_the_rest_is_taken():
+def test_missing_files_are_reported_and_the_rest_is_used():
     found = read({"joystick_demos.pkl": None, "joystick_parcours_times.txt": None})
     assert names(found) == [name for name in NAMES if not name.startswith("joystick")]
-    assert found.lost == (
-        "runs/7: expected joystick_demos.pkl, joystick_parcours_times.txt too, found none; what they hold is left out",
+    (lost,) = found.lost
+    assert lost == (
+        "runs/7: expected joystick_demos.pkl, joystick_parcours_times.txt too, found no such files; their data are "
+        "left out"
     )
 
 
@@ -112,14 +115,14 @@ def test_a_missing_map_is_taken_from_the_demonstrations():
     found = read({"nav_map.pkl": None}, passing_1=[first, demonstration(0.35)])
     assert names(found) == NAMES
     assert (found.occupancy.data == DATA).all()
-    assert found.lost == ("runs/7: expected nav_map.pkl too, found none; what they hold is left out",)
+    assert found.lost == ("runs/7: expected nav_map.pkl too, found no such files; their data are left out",)
     broken = read({"nav_map.pkl": b"hello"})
     assert names(broken) == NAMES
     (line,) = broken.lost
     assert line.startswith("runs/7/nav_map.pkl: expected a pickle of protocol 0")
 
 
-def test_a_broken_file_is_told_and_the_rest_is_taken():
+def test_a_broken_file_is_reported_and_the_rest_is_used():
     found = read({"force_demos.pkl": forge.participant()["force_demos.pkl"][:-1]})
     assert names(found) == NAMES[6:]
     (line,) = found.lost
@@ -141,7 +144,7 @@ def test_empty_lists_make_no_participant():
     empty = forge.dumped({"passing_1": []})
     files = forge.participant() | dict.fromkeys(DEMONSTRATIONS, empty)
     with pytest.raises(
-        ArtefactError, match=r"^runs/7: expected demonstrations and a map, found empty lists; fetch the files anew$"
+        ArtefactError, match=r"^runs/7: expected demonstrations and a map, found empty lists; download the files again$"
     ):
         participant_of(Run("7", "runs/7", files))
 
@@ -154,7 +157,7 @@ def test_without_a_map_there_is_no_participant():
         participant_of(Run("7", "runs/7", files))
 
 
-LIST = "expected lists of demonstrations by their names, found something else; fetch the file anew"
+LIST = "expected lists of demonstrations by their names, found something else; download the file again"
 
 
 @pytest.mark.parametrize(
@@ -166,11 +169,14 @@ LIST = "expected lists of demonstrations by their names, found something else; f
         ({1: demonstration(0.3)}, LIST),
         ({"a\nb": demonstration(0.3)}, LIST),
         ({"a" * 101: demonstration(0.3)}, LIST),
-        ({"passing_1": [None] * 101}, "expected at most 100 demonstrations, found more; fetch the file anew"),
-        ({"a": [None] * 60, "b": [None] * 41}, "expected at most 100 demonstrations, found more; fetch the file anew"),
+        ({"passing_1": [None] * 101}, "expected at most 100 demonstrations, found more; download the file again"),
+        (
+            {"a": [None] * 60, "b": [None] * 41},
+            "expected at most 100 demonstrations, found more; download the file again",
+        ),
     ],
 )
-def test_a_file_of_something_else_is_told(content, message):
+def test_a_file_of_something_else_is_reported(content, message):
     found = read({"force_demos.pkl": forge.dumped(content)})
     assert names(found) == NAMES[6:]
     assert found.lost == (f"runs/7/force_demos.pkl: {message}",)
@@ -178,8 +184,8 @@ def test_a_file_of_something_else_is_told(content, message):
 
 KIND = "expected Demonstration with its attributes, found "
 POSES = "world_poses: expected pairs of numbers (m), at least 2, found "
-PEOPLE = "people_pos: expected pairs of whole numbers (cells), found "
-PATH = "grid_path: expected pairs of whole numbers (cells), at least 1, found "
+PEOPLE = "people_pos: expected pairs of integers (cells), found "
+PATH = "grid_path: expected pairs of integers (cells), at least 1, found "
 FINITE = "world_poses: expected finite numbers of at most 1e+06 m, found others"
 LENGTH = "world_poses: expected a path of at most 1000 m, found one of "
 INSIDE = "grid_path: expected cells of the map (50 x 20), found others"
@@ -216,23 +222,23 @@ OTHER = (
         (demonstration(nav_map=nav_map(origin=(-3.0, 1.0))), OTHER + "(-3.0, 1.0) m)"),
     ],
 )  # fmt: skip
-def test_a_demonstration_of_something_else_is_told(value, message):
+def test_a_demonstration_of_something_else_is_reported(value, message):
     found = read(passing_1=[demonstration(0.3), value])
     assert names(found) == [name for name in NAMES if name != "force_demos/passing_1/2"]
-    assert found.lost == (f"runs/7/force_demos.pkl/passing_1/2: {message}; fetch the file anew",)
+    assert found.lost == (f"runs/7/force_demos.pkl/passing_1/2: {message}; download the file again",)
 
 
 @pytest.mark.parametrize("field", ["world_poses", "people_pos", "grid_path"])
-def test_a_demonstration_without_a_field_is_told(field):
+def test_a_demonstration_without_a_field_is_reported(field):
     (line,) = read(passing_1=[demonstration(0.3, **{field: None}), demonstration(0.3)]).lost
     assert line.startswith(f"runs/7/force_demos.pkl/passing_1/1: {field}: expected pairs of ")
-    assert line.endswith(", found none; fetch the file anew")
+    assert line.endswith(", found none; download the file again")
 
 
-def test_very_long_lists_are_told(monkeypatch):
+def test_very_long_lists_are_reported(monkeypatch):
     monkeypatch.setattr(fields, "MOST_ROWS", 70)
     found = read(passing_1=[demonstration(0.3, world_poses=[(0.0, 0.1 * i) for i in range(71)]), demonstration(0.3)])
-    assert found.lost == (f"runs/7/force_demos.pkl/passing_1/1: {POSES}71 of them; fetch the file anew",)
+    assert found.lost == (f"runs/7/force_demos.pkl/passing_1/1: {POSES}71 of them; download the file again",)
 
 
 def slots(place, value):
@@ -242,6 +248,7 @@ def slots(place, value):
     return changed
 
 
+ROTATED = "found them rotated"
 SIDES = "ros_occupancy_map: expected cells of 0.01 to 2.0 m and a finite origin, found "
 SIZE = "expected a map of {} x {} cells, found {}"
 
@@ -265,13 +272,13 @@ SIZE = "expected a map of {} x {} cells, found {}"
         (nav_map(resolution=1e300), SIDES + "1e+300 m and [-3.0, -1.0, 0.0]"),
         (nav_map(origin=(float("inf"), 0.0)), SIDES + "0.1 m and [inf, 0.0, 0.0]"),
         (nav_map(resolution="fine"), "ros_occupancy_map: expected a number, found 'fine'"),
-        (nav_map(turned=0.5), "ros_occupancy_map: expected cells along the axes of the map's frame, found them turned"),
+        (nav_map(turned=0.5), "ros_occupancy_map: expected cells along the axes of the map's frame, " + ROTATED),
     ],
 )  # fmt: skip
-def test_a_map_of_something_else_is_told(value, message):
+def test_a_map_of_something_else_is_reported(value, message):
     found = read({"nav_map.pkl": forge.dumped(value)})
     assert names(found) == NAMES, "the demonstrations' own map serves"
-    assert found.lost == (f"runs/7/nav_map.pkl: {message}; fetch the file anew",)
+    assert found.lost == (f"runs/7/nav_map.pkl: {message}; download the file again",)
 
 
 def test_a_map_as_an_array():
@@ -280,7 +287,7 @@ def test_a_map_as_an_array():
     assert (found.occupancy.data == DATA).all()
 
 
-def test_wrong_bytes_give_a_participant_or_known_trouble():
+def test_wrong_bytes_give_a_participant_or_an_expected_error():
     rng = np.random.default_rng(1)
     files = {"nav_map.pkl": forge.participant()["nav_map.pkl"]}
     whole = np.frombuffer(forge.dumped({"passing_1": demonstration(0.3, nav_map=None)}), dtype=np.uint8)

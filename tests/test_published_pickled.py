@@ -1,4 +1,4 @@
-"""Pickles are read as data: the same values as Python's unpickler gives, and nothing that it could be made to do."""
+"""Pickles are read as data: the same values as Python's unpickler gives, and no code is run."""
 
 import pickle
 import pickletools
@@ -17,7 +17,7 @@ from navirl_cli.published.fields import unpacked
 from navirl_cli.published.pickled import NAMES, Kept, Name, read_pickle
 
 NO_PICKLE = (
-    r"^x\.pkl: expected a pickle of protocol 0, as the study is published, found {} before byte \d+ of \d+; fetch"
+    r"^x\.pkl: expected a pickle of protocol 0, as the study is published, found {} before byte \d+ of \d+; download"
 )
 
 numbers = st.integers(-(10**18), 10**18) | st.floats(allow_nan=False) | st.booleans() | st.none()
@@ -97,13 +97,13 @@ RUNS = {
         ("within", "numpy.load.__globals__"),
     ],
 )
-def test_a_pickle_that_names_anything_else_is_refused_and_nothing_runs(tmp_path, way, name):
+def test_a_pickle_that_names_anything_else_is_refused_and_runs_no_code(tmp_path, way, name):
     marker = tmp_path / "ran"
     forged = RUNS[way].format(marker=marker).encode()
     with pytest.raises(
         ArtefactError,
         match=rf"^x\.pkl: expected only names that the published study needs, found {name} before byte \d+; "
-        "nothing was run; fetch the file from its authors anew$",
+        "no code was run; download the file from its authors again$",
     ):
         read(forged)
     assert not marker.exists()
@@ -175,24 +175,24 @@ def test_a_published_file_that_is_cut_anywhere_is_refused():
         (b"hello\n", "operation 'h'"),
         (b"<html>", "operation '<'"),
         (b"\x1f\x8b\x08\x00", r"operation '\\x1f'"),
-        (b".", "something left over at its end"),
-        (b"NN.", "something left over at its end"),
-        (b"(N.", "something left over at its end"),
-        (b"N.N", "something left over at its end"),
+        (b".", "more than one value at its end"),
+        (b"NN.", "more than one value at its end"),
+        (b"(N.", "more than one value at its end"),
+        (b"N.N", "more than one value at its end"),
         (b"a.", "an operation without its operand"),
         (b"Na.", "an operation on no list"),
-        (b"(dNNs.", "a dictionary's key that is neither text nor whole number"),
-        (b"(Nd.", "a dictionary's key that is neither text nor whole number"),
+        (b"(dNNs.", "a dictionary's key that is neither text nor integer"),
+        (b"(Nd.", "a dictionary's key that is neither text nor integer"),
         (b"NI1\nNs.", "an operation on no dict"),
         (b"t.", "an operation without its mark"),
         (b"NNb.", "an operation on no kept"),
         (b"NNR.", "a call of no name"),
         (b"I1\n(tR.", "a call of no name"),
         (b"cnumpy\ndtype\nNR.", "a call of no name"),
-        (b"p0\n.", "nothing to remember"),
-        (b"g0\n.", "a reference to nothing"),
-        (b"I1x\n.", "no whole number of at most 19 digits"),
-        (b"L" + b"9" * 1_000_000 + b"L\n.", "no whole number of at most 19 digits"),
+        (b"p0\n.", "no value to remember"),
+        (b"g0\n.", "a reference to no value"),
+        (b"I1x\n.", "no integer of at most 19 digits"),
+        (b"L" + b"9" * 1_000_000 + b"L\n.", "no integer of at most 19 digits"),
         (b"Fnought\n.", "no number"),
         (b"F" + b"1" * 1_000_000 + b"\n.", "no number"),
         (b"Sabc\n.", "no string in quotes"),
@@ -225,7 +225,7 @@ def test_a_shape_that_claims_gigabytes_is_refused_before_anything_is_allocated()
 
 def test_keys_that_would_take_for_ever_to_hash_are_refused():
     nested = b"((tp0\n" + b"(g0\ng0\ntp0\n" * 200 + b"l"  # each holds the one before twice
-    with refused("a dictionary's key that is neither text nor whole number"):
+    with refused("a dictionary's key that is neither text nor integer"):
         read(b"(" + nested + b"(dg0\nNst.")
 
 
@@ -284,5 +284,5 @@ def test_an_array_of_anything_else_is_refused(change, message):
 
 
 def test_a_number_without_its_bytes_is_refused():
-    with pytest.raises(ValueError, match=r"^expected plain numbers of numpy's, found them incomplete$"):
+    with pytest.raises(ValueError, match=r"^expected plain numbers of numpy, found them incomplete$"):
         unpacked(read(b"cnumpy.core.multiarray\nscalar\n(tR."))

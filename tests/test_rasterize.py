@@ -72,8 +72,8 @@ def test_any_line_becomes_a_path_without_spare_cells_that_it_crosses(rule, line)
 
 @pytest.mark.parametrize("rule", Rule)
 @pytest.mark.parametrize("seed", range(5))
-def test_a_path_moves_with_its_line_by_whole_cells(rule, seed):
-    # Binary fractions, so that nothing is rounded.
+def test_a_path_moves_with_its_line_by_integer_numbers_of_cells(rule, seed):
+    # binary fractions, which are not rounded
     line = np.round(make.shaken(seed) * 1024) / 1024
     grid = Grid(np.zeros((64, 64), dtype=bool), 0.125, (-4.0, -4.0))
     moved = rasterize(line + np.array([5, -3]) * 0.125, grid, rule)
@@ -140,7 +140,7 @@ def test_a_straight_line_takes_no_detour_and_stays_within_a_cell_of_it(rule, end
         abs(a - b) < 1e-3 and abs(a - round(a)) < 1e-3 and abs(c - d) >= 1e-3
         for a, b, c, d in ((x0, x1, y0, y1), (y0, y1, x0, x1))
     )
-    # Half way between two diagonals of cells the same happens: all their centres are equally near.
+    # Halfway between two diagonals of cells the same happens: all their centres are equally near.
     between_diagonals = any(
         abs(a - b) < 1e-3 and abs(a % 1 - 0.5) < 1e-3 and abs(x1 - x0) >= 1e-3
         for a, b in ((x0 + y0, x1 + y1), (x0 - y0, x1 - y1))
@@ -192,7 +192,7 @@ def test_a_path_within_one_cell_is_that_cell(rule):
     assert rasterize(np.array([[0.01, 0.01], [0.01, 0.01]]), make.open_grid(2, 2), rule).tolist() == [[0, 0]]
 
 
-def test_a_rule_that_walks_on_and_on_is_stopped_and_says_where(monkeypatch):
+def test_a_rule_that_does_not_end_is_stopped_with_its_place(monkeypatch):
     monkeypatch.setattr("navirl_cli.demos.rasterize.PATIENCE", 0)
     with pytest.raises(DemonstrationError, match=r"circles near x -2\.95 m, y 0\.10 m.*coarser `resolution`"):
         rasterize(np.array([[-2.95, 0.1], [2.95, 0.1]]), GRID)

@@ -140,7 +140,7 @@ def test_completion_times_are_the_published_ones(summary):
             assert summary["completion_s"][modality][run] == [float(text)]
 
 
-def test_what_holds_and_what_does_not_is_said(summary, written):
+def test_which_claims_hold_is_reported(summary, written):
     verdicts = {claim["claim"]: claim["verdict"] for claim in summary["claims"]}
     assert len(verdicts) == 6
     assert verdicts["Obstacle avoidance begins to give way later than people wish."] == "holds"

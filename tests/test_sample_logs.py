@@ -46,7 +46,7 @@ def test_three_participants_of_at_most_6_mb():
     assert sum(log.stat().st_size for log in LOGS) < 6e6
 
 
-def test_every_trial_is_found_and_none_invented(pairs):
+def test_exactly_the_true_trials_are_found(pairs):
     for demonstrations, truth in pairs:
         assert len(demonstrations) == len(truth.trials) == 7
         for d, true in zip(demonstrations, truth.trials, strict=True):

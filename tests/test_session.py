@@ -1,4 +1,4 @@
-"""What the metadata records of a log say of its session."""
+"""The session of a log, from its metadata records."""
 
 import json
 
@@ -28,7 +28,7 @@ def told(tmp_path, session=None, published=None):
     return session_of("run.mcap", [scan(path)])
 
 
-def test_everything_that_can_be_said(tmp_path):
+def test_a_record_with_every_key(tmp_path):
     entry = {"t_ns": 5, "cycle": 1, "condition": "force", "set": "s", "nominal_m": [[0, 1], [2, 3]]}
     session = told(
         tmp_path,
@@ -49,7 +49,7 @@ def test_everything_that_can_be_said(tmp_path):
     assert session.completion_s == {"force": (18.8,), "joystick": (17.0, 12.5)}
 
 
-def test_nothing_is_said_without_records(tmp_path):
+def test_a_log_without_records(tmp_path):
     session = told(tmp_path)
     assert (session.participant, session.declared, session.published) == (None, (), ())
     assert (session.robot_radius_m, session.laid_out_m_s, session.completion_s) == (None, None, {})
@@ -88,7 +88,7 @@ def test_broken_published_cells_are_named(tmp_path, cells):
 @pytest.mark.parametrize(
     ("said", "user", "radius"), [(None, None, ROBOT_RADIUS_M), ("0.2", None, 0.2), ("0.2", 0.0, 0.0)]
 )
-def test_the_users_radius_stands_before_the_logs(tmp_path, said, user, radius):
+def test_the_users_radius_goes_before_the_logs(tmp_path, said, user, radius):
     session = None if said is None else {"robot_radius_m": said}
     recording = load_recording(write_run(tmp_path / "run.mcap", Run(session=session)))
     (one,) = extract(recording, ExtractSettings(robot_radius_m=user)).demonstrations
@@ -109,7 +109,7 @@ def test_cells_are_held_against_those_published(tmp_path):
         assert extract(load_recording(log), ExtractSettings()).published == {"this": same, "another trial": False}
 
 
-def test_a_trial_ends_where_the_record_says(tmp_path):
+def test_a_trial_ends_at_the_time_in_the_record(tmp_path):
     entry = {"t_ns": GOAL_NS + 300_000_000, "stop_ns": GOAL_NS + 6_000_000_000}
     recording = load_recording(write_run(tmp_path / "run.mcap", Run(session={"trials": json.dumps([entry])})))
     (one,) = extract(recording, ExtractSettings()).demonstrations

@@ -92,7 +92,7 @@ def test_a_bag_is_called_like_its_folder_however_that_is_given(tmp_path, monkeyp
         ("[walk_0.mcap, walk_1.mcap, walk_0.mcap]", "[]"),
     ],
 )
-def test_every_way_of_listing_files_is_read(tmp_path, listed, files):
+def test_every_form_of_listing_files_is_read(tmp_path, listed, files):
     folder = bag(tmp_path / "walk", "walk_0.mcap", "walk_1.mcap")
     describe(folder, listed, files=files)
     (source,) = sources_of([folder])
@@ -117,7 +117,7 @@ def test_files_compressed_or_decompressed_since_are_found(tmp_path):
     )
 
 
-def test_missing_and_unlisted_files_of_a_bag_are_told(tmp_path):
+def test_missing_and_unlisted_files_of_a_bag_are_reported(tmp_path):
     folder = bag(tmp_path / "w", "w_1.mcap")
     describe(folder, ["w_0.mcap", "w_1.mcap", "w_2.mcap"])
     put(folder / "w_1.mcap.zstd", folder / "later.mcap", folder / ".hidden.mcap", folder / "notes.txt")
@@ -143,7 +143,7 @@ def test_a_bag_without_any_of_its_files_is_refused(tmp_path):
             sources_of([argument])
 
 
-def test_renamed_files_of_a_bag_are_read_and_told(tmp_path):
+def test_renamed_files_of_a_bag_are_read_and_reported(tmp_path):
     folder = describe(tmp_path / "w", ["rosbag2_2024_0.mcap"])
     put(folder / "third_walk.mcap")
     reason = "listed in metadata.yaml, but missing; its messages are lost"
@@ -203,7 +203,7 @@ TAKEN = "; the folder's files are taken without it"
         ],
     ],
 )
-def test_a_metadata_file_that_is_none_is_noted(tmp_path, text, note):
+def test_an_invalid_metadata_file_is_noted(tmp_path, text, note):
     folder = tmp_path / "w"
     put(folder / "w_1.mcap", folder / "w_0.mcap")
     (folder / "metadata.yaml").write_text(text, encoding="utf-8")
@@ -224,7 +224,7 @@ def test_pieces_without_metadata_are_one_recording_in_the_order_of_their_numbers
     )
 
 
-def test_holes_in_the_numbers_are_told(tmp_path):
+def test_missing_pieces_are_reported(tmp_path):
     folder = tmp_path / "w"
     put(*(folder / f"w_{number}.mcap" for number in (1, 2, 7, 9, 12)))
     (source,) = sources_of([folder])
@@ -330,7 +330,7 @@ def test_a_folder_that_may_not_be_read_is_named(tmp_path, monkeypatch):
         sources_of([tmp_path])
 
 
-def test_patterns_stand_for_what_they_match(tmp_path, monkeypatch):
+def test_patterns_mean_all_files_that_they_match(tmp_path, monkeypatch):
     put(*(tmp_path / f"run{number}.mcap" for number in (1, 2, 10)), tmp_path / "run.txt", tmp_path / ".run3.mcap")
     bag(tmp_path / "run4", "run4_0.mcap", "run4_1.mcap")
     monkeypatch.chdir(tmp_path)
@@ -405,7 +405,7 @@ def test_joined_files_are_one_recording_under_the_first_name(tmp_path):
     assert sources_of(pieces, join=True) == [Source("v_1.mcap", tuple(pieces))]
 
 
-def test_a_piece_given_alone_is_told(tmp_path, monkeypatch):
+def test_a_piece_given_alone_is_reported(tmp_path, monkeypatch):
     folder = bag(tmp_path / "[w]", "[w]_0.mcap", "[w]_1.mcap.zstd", "[w]_2.mcap")
     note = f"[w]_1.mcap.zstd is one of 3 pieces of a recording; give the folder {folder} to read them as one"
     assert sources_of([folder / "[w]_1.mcap.zstd"])[0].notes == (note,)

@@ -1,4 +1,4 @@
-"""Which topics play which roles in recordings as robots with Nav2, mocap and simulators make them."""
+"""Which topics serve which roles in recordings as robots with Nav2, mocap and simulators make them."""
 
 import nav_log as nav
 import numpy as np
@@ -56,16 +56,16 @@ NAV2 = {
 
 
 @pytest.fixture
-def pick(tmp_path):
+def choose_topics(tmp_path):
     """The choices of a recording with one message on each topic."""
 
-    def picked(topics, **chosen):
+    def chosen(topics, **requested):
         log = nav.Log()
         log.messages = [nav.Message(topic, typename, 1, b"") for topic, typename in topics.items()]
         path = log.write(tmp_path / "run.mcap")
-        return choose("run.mcap", topics_of([scan(path)]), {role: (wish,) for role, wish in chosen.items()})
+        return choose("run.mcap", topics_of([scan(path)]), {role: (wish,) for role, wish in requested.items()})
 
-    return picked
+    return chosen
 
 
 def without(*left_out):
@@ -77,9 +77,9 @@ def named(found, role):
     return [topic.name for topic in found[role].topics]
 
 
-def test_a_recording_of_nav2(pick):
+def test_a_recording_of_nav2(choose_topics):
     topics = without("/goal_update")
-    found = pick(topics)
+    found = choose_topics(topics)
     assert {role: named(found, role) for role in found} == {
         "wrench": ["/ft_sensor/wrench"],
         "odometry": ["/odom"],
@@ -129,8 +129,8 @@ def test_a_recording_of_nav2(pick):
         ({"/cmd_vel_key": TWIST_STAMPED}, "joystick", "/cmd_vel_key"),
     ],
 )
-def test_the_best_of_several(pick, topics, role, expected):
-    assert named(pick(topics), role) == [expected]
+def test_the_best_of_several(choose_topics, topics, role, expected):
+    assert named(choose_topics(topics), role) == [expected]
 
 
 @pytest.mark.parametrize(
@@ -146,15 +146,15 @@ def test_the_best_of_several(pick, topics, role, expected):
         ({"/tf": TF}, "tf_static"),
     ],
 )
-def test_what_does_not_fit_is_not_taken(pick, topics, role):
-    found = pick(topics)[role]
+def test_topics_that_do_not_fit_are_not_taken(choose_topics, topics, role):
+    found = choose_topics(topics)[role]
     assert found.topics == ()
     assert not found.ambiguous
     assert found.problem.startswith(f"no {role}: expected a topic of type ")
 
 
-def test_one_person_a_topic_and_namespaced_frames(pick):
-    found = pick(
+def test_one_person_a_topic_and_namespaced_frames(choose_topics):
+    found = choose_topics(
         {
             "/mocap/person1/pose": POSE,
             "/mocap/person2/pose": POSE,
@@ -181,14 +181,14 @@ def test_one_person_a_topic_and_namespaced_frames(pick):
         ({"/left/people": PEOPLE, "/right/people": PEOPLE}, "people", "people_msgs/People"),
     ],
 )
-def test_equal_candidates_are_the_users_choice(pick, topics, role, types):
+def test_the_user_chooses_between_equal_candidates(choose_topics, topics, role, types):
     first, second = topics
-    found = pick(topics)[role]
+    found = choose_topics(topics)[role]
     assert found.ambiguous
     assert found.problem == (
         f"several topics could be the {role} ({types}): {first}, {second}; choose one with `topic` {role}={first}"
     )
-    chosen = pick(topics, **{role: second})[role]
+    chosen = choose_topics(topics, **{role: second})[role]
     assert ([topic.name for topic in chosen.topics], chosen.reason) == ([second], "named by `topic`")
 
 
@@ -226,7 +226,7 @@ def test_choices_that_do_not_fit(tmp_path, chosen, message):
     assert str(caught.value) == message
 
 
-def test_what_is_named_twice_is_meant_once(tmp_path):
+def test_a_topic_named_twice_counts_once(tmp_path):
     log = nav.Log()
     log.messages = [nav.Message(topic, POSES, 1, b"") for topic in ("/left", "/right")]
     topics = topics_of([scan(log.write(tmp_path / "run.mcap"))])
@@ -234,8 +234,8 @@ def test_what_is_named_twice_is_meant_once(tmp_path):
     assert named(found, "people") == ["/right", "/left"]
 
 
-def test_a_topic_without_messages_is_told(pick, tmp_path):
-    found = pick({"/scan": "sensor_msgs/msg/LaserScan", "/map": GRID, "/a_pose": POSE})
+def test_a_topic_without_messages_is_reported(choose_topics, tmp_path):
+    found = choose_topics({"/scan": "sensor_msgs/msg/LaserScan", "/map": GRID, "/a_pose": POSE})
     assert "if /a_pose is meant, `topic` odometry=/a_pose; record the robot's odometry" in found["odometry"].problem
     topics = topics_of([scan(tmp_path / "run.mcap")])
     assert str(refusal("run.mcap", topics, found["wrench"])) == (
@@ -266,12 +266,12 @@ def test_the_type_of_most_messages_counts(tmp_path):
     assert (topic.type_name, topic.count) == (ODOMETRY, 3)
 
 
-# through a whole recording
+# through a complete recording
 
 
 @pytest.fixture
 def nav2(tmp_path):
-    """A run in which every candidate says something else, so that what was read shows which was taken."""
+    """A run in which every candidate holds other numbers: what was read shows which was taken."""
     log = nav.drive(6.0)
     log.add("/global_costmap/costmap", nav.grid(value=50), nav.START_NS)
     log.add("/local_costmap/costmap", nav.grid(frame="odom", value=60), nav.START_NS)
@@ -290,7 +290,7 @@ def nav2(tmp_path):
     return log.write(tmp_path / "run.mcap")
 
 
-def test_a_nav2_recording_is_read_as_meant(nav2):
+def test_a_nav2_recording_is_read_by_the_right_topics(nav2):
     recording = load_recording(nav2)
     assert recording.damage == recording.notes == ()
     assert recording.wrench.force_n[:, 0].tolist() == pytest.approx((np.arange(600) / 100).tolist())
@@ -322,7 +322,7 @@ def test_a_choice_by_the_user_goes_before_rules(nav2):
     assert (recording.command > 0.1).sum() == 1
 
 
-def test_a_map_of_the_users_needs_none_in_the_log(nav2, tmp_path):
+def test_with_a_map_of_the_user_the_log_needs_no_map(nav2, tmp_path):
     occupancy = load_recording(nav2).occupancy
     bare = nav.drive(6.0, skip=["/map"]).write(tmp_path / "bare.mcap")
     with pytest.raises(LogError, match=r"bare.mcap: no map: expected a topic of type nav_msgs/OccupancyGrid; give the"):

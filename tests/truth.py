@@ -1,4 +1,4 @@
-"""What truly happened in a simulated log: read by mcap's own reader, not by navirl's."""
+"""The truth of a simulated log: read by mcap's own reader, not by navirl's."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""The published archive, read member by member into memory, whatever it holds."""
+"""The published archive, read member by member into memory; its content is not trusted."""
 
 import gzip
 import tarfile
@@ -10,8 +10,8 @@ from typing import IO, Final, cast
 
 from navirl_cli.errors import ArtefactError
 
-#: Most bytes of a file, of an archive unpacked, and of the lengths and names before a member; most members. The
-#: published files take a quarter of a megabyte each.
+#: Limits: bytes of a file, of the unpacked archive, and of a member's header; number of members. A published file takes
+#: a quarter of a megabyte.
 MOST_OF_A_FILE: Final = 64 << 20
 MOST_IN_ALL: Final = 1 << 30
 MOST_OF_A_HEADER: Final = 4096
@@ -23,11 +23,11 @@ _CHUNK: Final = 1 << 20
 
 
 class _Forward:
-    """A stream that tarfile reads headers from: forward only, in small pieces, and not beyond a gigabyte."""
+    """A stream from which tarfile reads headers: forward only, in small pieces, and not beyond a gigabyte."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
-        #: What was read last.
+        #: The bytes read last.
         self.last = b""
 
     def tell(self) -> int:
@@ -50,7 +50,7 @@ class _Forward:
         return self.last
 
     def content(self, member: tarfile.TarInfo) -> bytes:
-        """A member's bytes, from where its header ends."""
+        """A member's bytes, which follow its header."""
         data = self._stream.read(member.size)
         if len(data) < member.size:
             raise tarfile.ReadError("its end within a member")
@@ -69,14 +69,14 @@ def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePos
 
     Args:
         archive: Its path.
-        wanted: Says of a file's name, without folders, whether to read it.
+        wanted: Whether to read a file, by its name without folders.
 
     Returns:
-        The files' bytes by their paths, and wanted members that were left out, in words: links, and paths that lead
-        out of the archive.
+        The files' bytes by their paths, and wanted members that were left out, in words: links, and paths that lead out
+        of the archive.
 
     Raises:
-        ArtefactError: It cannot be read, is damaged or cut off, or holds more than the study can.
+        ArtefactError: It cannot be read, is damaged or truncated, or holds more than the study can.
     """
     found: dict[PurePosixPath, bytes] = {}
     lost = []
@@ -97,14 +97,14 @@ def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePos
     except (tarfile.TarError, EOFError, OSError, zlib.error, ValueError, RecursionError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise ArtefactError(
-            f"{archive}: expected a whole tar archive of the study (runs.tar.gz), found {reason}; fetch it anew, or "
-            "name the folder into which it was unpacked"
+            f"{archive}: expected an intact tar archive of the study (runs.tar.gz), found {reason}; download it "
+            "again, or give the folder into which it was unpacked"
         ) from error
     return found, lost
 
 
 def _opened(archive: Path, stack: ExitStack) -> IO[bytes]:
-    """The archive's bytes, unpacked."""
+    """The archive's bytes, decompressed."""
     file = stack.enter_context(archive.open("rb"))
     head = file.read(max(map(len, _OTHERS)))
     packed = head.startswith(_GZIP)
@@ -116,7 +116,7 @@ def _opened(archive: Path, stack: ExitStack) -> IO[bytes]:
 
 
 def _members(stream: _Forward) -> Iterator[tarfile.TarInfo]:
-    """Headers one after the other."""
+    """The members' headers in order."""
     with tarfile.open(fileobj=cast("IO[bytes]", stream), mode="r:") as tar:
         for number, member in enumerate(tar):
             if number >= MOST_MEMBERS:

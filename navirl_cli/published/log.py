@@ -13,13 +13,13 @@ from navirl_cli.logs.messages.writer import LogWriter, header, message_type, pla
 from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Occupancy
 from navirl_cli.published.participant import Participant, PublishedPath
 
-#: The paper's speed along x (v_nav, Sec. V), m/s: at it positions are laid out, for they come without times.
+#: The paper's speed along x (v_nav, Sec. V), m/s, at which positions are laid out, because they come without times.
 SPEED_M_S: Final = 0.4
 #: The clock's zero, 2020-01-01: the first session starts here, the next an hour later, ns.
 EPOCH_NS: Final = 1_577_836_800_000_000_000
 HOUR_NS: Final = 3_600_000_000_000
-#: Rest before the first and after the last published position, with poses at 10 Hz and people at 5 Hz; then silence.
-BEFORE_NS, AFTER_NS, SILENCE_NS = 2_000_000_000, 3_000_000_000, 60_000_000_000
+#: Rest before the first and after the last published position, gap to the next trial, ns; periods of poses and people.
+BEFORE_NS, AFTER_NS, GAP_NS = 2_000_000_000, 3_000_000_000, 60_000_000_000
 POSE_NS, PEOPLE_NS = 100_000_000, 200_000_000
 #: From the announcement of the goal to the first motion, ns.
 ANNOUNCED_NS: Final = 500_000_000
@@ -62,7 +62,7 @@ def laid_out(path: PublishedPath, start_ns: int) -> Trial:
     """Give a path times: rest, the published positions at constant speed along their line, rest.
 
     Args:
-        path: Equal positions in a row count once, since they carry no time.
+        path: Equal successive positions count once, because they carry no time.
         start_ns: When the first rest begins, ns.
     """
     xy = path.xy_m
@@ -70,7 +70,7 @@ def laid_out(path: PublishedPath, start_ns: int) -> Trial:
     steps = np.hypot(*np.diff(xy, axis=0).T)
     t_ns = np.rint(np.concatenate([[0.0], np.cumsum(steps)]) / SPEED_M_S * 1e9).astype(np.int64)
     order = np.arange(len(t_ns))
-    t_ns = np.maximum.accumulate(t_ns - order) + order  # by a nanosecond at least
+    t_ns = np.maximum.accumulate(t_ns - order) + order  # at least a nanosecond apart
     before = np.arange(0, BEFORE_NS, POSE_NS) - BEFORE_NS
     after = t_ns[-1] + np.arange(POSE_NS, AFTER_NS + 1, POSE_NS)
     rests = len(before), len(after)
@@ -85,7 +85,7 @@ def laid_out(path: PublishedPath, start_ns: int) -> Trial:
 
 
 def _headings(steps: FloatArray, lengths_m: FloatArray) -> FloatArray:
-    """(n,) rad at n positions from the (n - 1, 2) steps between them: along the next one, held through standstill."""
+    """(n,) rad at n positions from the (n - 1, 2) steps between them: along the next one, held at rest."""
     seen = np.flatnonzero(lengths_m > LEAST_STEP_M)
     if len(seen) == 0:
         return np.zeros(len(steps) + 1)
@@ -99,7 +99,7 @@ def write_log(participant: Participant, number: int, path: Path, *, force: bool)
     """Write a participant's log; the same input gives the same bytes.
 
     Args:
-        participant: What was published.
+        participant: The published data.
         number: Of the session, from 0; it sets the clock.
         path: The log to write.
         force: Whether to replace an existing file.
@@ -114,15 +114,15 @@ def write_log(participant: Participant, number: int, path: Path, *, force: bool)
         for one in participant.paths:
             trial = laid_out(one, start_ns)
             _write_trial(writer, trial, participant)
-            writer.flush()  # a trial at a time, so that long sessions need no more memory
+            writer.flush()  # a trial at a time: long sessions need no more memory
             trials.append(trial)
-            start_ns = int(trial.t_ns[-1]) + SILENCE_NS
+            start_ns = int(trial.t_ns[-1]) + GAP_NS
         writer.metadata(SESSION_RECORD, _session(participant, trials))
         writer.metadata(PUBLISHED_RECORD, _published(trials))
 
 
 def _write_scene(writer: LogWriter, occupancy: Occupancy, start_ns: int) -> None:
-    """The map, and that odometry needs no correction: published positions are localised already."""
+    """The map, and a constant transform to the odometry's frame: published positions are localised already."""
     rows, columns = occupancy.data.shape
     origin = planar_pose(*occupancy.origin_m, 0.0)
     head = header(start_ns, "map")
@@ -176,19 +176,19 @@ def _transform(t_ns: int, parent: str, child: str, pose: Any) -> Any:
 
 
 def _session(participant: Participant, trials: list[Trial]) -> dict[str, str]:
-    """The metadata record of what only the experimenter knows."""
+    """The metadata record with what only the experimenter knows."""
     entries = []
     for trial in trials:
         part, line = trial.path.part, nominal_m(trial.path, participant)
-        said = {
+        entry = {
             "t_ns": trial.goal_ns,
             "stop_ns": trial.stop_ns,
             "condition": part.condition,
             "cycle": part.cycle,
             "set": part.set,
         }
-        said["nominal_m"] = None if line is None else line.tolist()
-        entries.append({key: value for key, value in said.items() if value is not None})
+        entry["nominal_m"] = None if line is None else line.tolist()
+        entries.append({key: value for key, value in entry.items() if value is not None})
     values = {
         "participant": participant.name,
         "trials": json.dumps(entries),
@@ -202,8 +202,8 @@ def _session(participant: Participant, trials: list[Trial]) -> dict[str, str]:
 def nominal_m(path: PublishedPath, participant: Participant) -> FloatArray | None:
     """(2, 2) m: the line that the navigation followed past a person, along the hallway (x) through the goal.
 
-    It is the line y = 0.05 m for every pass, wherever the robot started (Sec. IV-C). None of the obstacle course, which
-    has another.
+    It is the line y = 0.05 m for every pass, wherever the robot started (Sec. IV-C). None for the obstacle course,
+    which has another line.
     """
     if len(path.people) == 0:
         return None
@@ -212,7 +212,7 @@ def nominal_m(path: PublishedPath, participant: Participant) -> FloatArray | Non
 
 
 def ring_m(occupancy: Occupancy) -> float | None:
-    """Depth of the ring of inscribed cells around the obstacles, m: the radius of the robot that the map was made for.
+    """Width of the ring of inscribed cells around the obstacles, m: the radius of the robot of the map.
 
     None where the map has no such ring.
     """
@@ -226,6 +226,6 @@ def ring_m(occupancy: Occupancy) -> float | None:
 
 
 def _published(trials: list[Trial]) -> dict[str, str]:
-    """The metadata record of what the published cells are, for a check to compare."""
+    """The metadata record with the published cells, for comparison."""
     entries = [{"t_ns": trial.goal_ns, "name": trial.path.name, "cells": trial.path.cells.tolist()} for trial in trials]
     return {"cells": json.dumps(entries), "note": NOTE}

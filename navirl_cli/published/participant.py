@@ -1,4 +1,4 @@
-"""What the study published of one participant: paths, map and completion times, checked."""
+"""The published data of one participant: paths, map and completion times, checked."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from navirl_cli.published.fields import occupancy_in, pairs_in, state_of
 from navirl_cli.published.pickled import read_pickle
 from navirl_cli.published.runs import DEMONSTRATIONS, EXPECTED, MAP, TIMES, Run
 
-#: More than this nobody drove in a hallway: paths in a file, m of one path, people beside it; m from the map's origin.
+#: Limits of what can be driven in a hallway: paths in a file, length of a path in m, people; m from the map's origin.
 MOST_PATHS, MOST_M, MOST_PEOPLE, FARTHEST_M = 100, 1000.0, 100, 1e6
-#: Bytes of completion times.
+#: Most bytes of completion times.
 MOST_OF_TIMES: Final = 10_000
 
 Value = TypeVar("Value")
@@ -28,12 +28,12 @@ Arguments = ParamSpec("Arguments")
 
 @dataclass(frozen=True)
 class Part:
-    """What a list of demonstrations is in the study."""
+    """The role of a list of demonstrations in the study."""
 
     condition: Condition
-    #: Of the interaction, for pushed passes.
+    #: Interaction cycle, for pushed passes.
     cycle: int | None = None
-    #: What it was for, where it is not a plain pass.
+    #: Purpose, where it is not a plain pass.
     set: str | None = None
 
 
@@ -67,21 +67,21 @@ class PublishedPath:
 
 @dataclass(frozen=True, eq=False)
 class Participant:
-    """What was published of one participant."""
+    """The published data of one participant."""
 
     name: str
-    #: The map in which all cells count.
+    #: The map of all cells.
     occupancy: Occupancy
     #: In the order in which the study was run.
     paths: tuple[PublishedPath, ...]
     #: Times in which the obstacle course was completed, s, by modality.
     completion_s: Mapping[str, tuple[float, ...]]
-    #: What is missing or could not be used, in words.
+    #: Missing and unusable data, in words.
     lost: tuple[str, ...]
 
     @property
     def grid(self) -> Grid:
-        """The map's cells. What it publishes is an inflated costmap, which no radius grows."""
+        """The map's cells. The published map is an inflated costmap, which no radius grows."""
         return grid_from_occupancy(
             self.occupancy.data, self.occupancy.resolution_m, self.occupancy.origin_m, robot_radius_m=0.0
         )
@@ -89,7 +89,7 @@ class Participant:
 
 @dataclass(frozen=True)
 class _Entry:
-    """One demonstration as its file has it."""
+    """One demonstration in its file."""
 
     #: The demonstration's file and place in it, for messages.
     place: str
@@ -100,10 +100,10 @@ class _Entry:
 
 
 def participant_of(run: Run) -> Participant:
-    """Read and check the files of one participant; what cannot be used is left out and told.
+    """Read and check the files of one participant; unusable data are left out and listed.
 
     Raises:
-        ArtefactError: No path or no map is left.
+        ArtefactError: No path or no map is usable.
     """
     lost = list(run.lost)
     entries = [
@@ -115,13 +115,13 @@ def participant_of(run: Run) -> Participant:
     occupancy = _map(run, entries, lost)
     missing = [name for name in EXPECTED if name not in run.files and not any(name in line for line in run.lost)]
     if missing:
-        lost.append(f"{run.place}: expected {', '.join(missing)} too, found none; what they hold is left out")
+        lost.append(f"{run.place}: expected {', '.join(missing)} too, found no such files; their data are left out")
     known = list(PARTS)
     entries.sort(key=lambda entry: known.index(entry.part) if entry.part in PARTS else len(known))
     found = [_tried(lost, _path, entry, occupancy) for entry in entries] if occupancy else []
     paths = tuple(path for path in found if path is not None)
     if occupancy is None or not paths:
-        first = f"none: {lost[0]}" if lost else "empty lists; fetch the files anew"
+        first = f"none: {lost[0]}" if lost else "empty lists; download the files again"
         rest = f" (and {len(lost) - 1} more)" if lost[1:] else ""
         raise ArtefactError(f"{run.place}: expected demonstrations and a map, found {first}{rest}")
     times = {name.removesuffix(TIMES): name for name in sorted(run.files) if name.endswith(TIMES)}
@@ -135,7 +135,7 @@ def participant_of(run: Run) -> Participant:
 def _tried(
     lost: list[str], function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
 ) -> Value | None:
-    """What a function gives; None, and the reason in `lost`, where that is known trouble."""
+    """The result of a function; None after an expected error, which is added to `lost`."""
     try:
         return function(*args, **kwargs)
     except ArtefactError as error:
@@ -150,7 +150,7 @@ def _entries(place: str, data: bytes) -> list[_Entry]:
     keys = sorted(content) if type(content) is dict and all(type(key) is str for key in content) else []
     if not keys or not all(key.isprintable() and len(key) <= 100 for key in keys):
         raise ArtefactError(
-            f"{place}: expected lists of demonstrations by their names, found something else; fetch the file anew"
+            f"{place}: expected lists of demonstrations by their names, found something else; download the file again"
         )
     entries = []
     for key in keys:
@@ -158,12 +158,14 @@ def _entries(place: str, data: bytes) -> list[_Entry]:
         for number, value in enumerate(several[: MOST_PATHS + 1], start=1):
             entries.append(_Entry(f"{place}/{key}/{number}", (file, key), number, value))
     if len(entries) > MOST_PATHS:
-        raise ArtefactError(f"{place}: expected at most {MOST_PATHS} demonstrations, found more; fetch the file anew")
+        raise ArtefactError(
+            f"{place}: expected at most {MOST_PATHS} demonstrations, found more; download the file again"
+        )
     return entries
 
 
 def _map(run: Run, entries: list[_Entry], lost: list[str]) -> Occupancy | None:
-    """The participant's map; where its file is missing, that of the first demonstration that has one."""
+    """The participant's map; without its file that of the first demonstration with a map."""
     if MAP in run.files:
         place = f"{run.place}/{MAP}"
         found = _tried(lost, lambda: _checked(place, occupancy_in, read_pickle(run.files[MAP], place)))
@@ -180,16 +182,16 @@ def _map(run: Run, entries: list[_Entry], lost: list[str]) -> Occupancy | None:
 
 
 def _own_map(demonstration: Any) -> Occupancy:
-    """The map that a demonstration holds."""
+    """The map in a demonstration."""
     return occupancy_in(state_of(demonstration, "Demonstration").get("nav_map"))
 
 
 def _checked(place: str, parse: Callable[[Any], Value], value: Any) -> Value:
-    """What a value says; a ValueError of the parser is known trouble."""
+    """The result of a parser; its ValueError becomes an expected error."""
     try:
         return parse(value)
     except ValueError as error:
-        raise ArtefactError(f"{place}: {error}; fetch the file anew") from error
+        raise ArtefactError(f"{place}: {error}; download the file again") from error
 
 
 def _path(entry: _Entry, occupancy: Occupancy) -> PublishedPath:
@@ -198,11 +200,11 @@ def _path(entry: _Entry, occupancy: Occupancy) -> PublishedPath:
 
 
 def _parsed(entry: _Entry, value: Any, occupancy: Occupancy) -> PublishedPath:
-    """One demonstration; ValueError where it does not fit."""
+    """One demonstration; raises ValueError where it does not fit."""
     state = state_of(value, "Demonstration")
     xy_m = pairs_in(state, "world_poses", float, "pairs of numbers (m), at least 2", least=2)
-    people = pairs_in(state, "people_pos", int, "pairs of whole numbers (cells)")
-    cells = pairs_in(state, "grid_path", int, "pairs of whole numbers (cells), at least 1", least=1)
+    people = pairs_in(state, "people_pos", int, "pairs of integers (cells)")
+    cells = pairs_in(state, "grid_path", int, "pairs of integers (cells), at least 1", least=1)
     if not (np.abs(xy_m) <= FARTHEST_M).all():
         raise ValueError(f"world_poses: expected finite numbers of at most {FARTHEST_M:g} m, found others")
     length_m = float(np.hypot(*np.diff(xy_m, axis=0).T).sum())
@@ -232,5 +234,5 @@ def _completion(place: str, data: bytes) -> tuple[float, ...]:
     except ValueError:
         seconds = ()
     if not seconds or not all(isfinite(value) and value > 0 for value in seconds):
-        raise ArtefactError(f"{place}: expected seconds above 0, found {data[:40]!r}; fetch the file anew")
+        raise ArtefactError(f"{place}: expected seconds above 0, found {data[:40]!r}; download the file again")
     return seconds

@@ -1,9 +1,9 @@
-"""Reads pickles of protocol 0, as the study publishes them, as data: nothing in them is ever called.
+"""Reads pickles of protocol 0, as the study publishes them, as data: no code in them is ever called.
 
-Unpickling runs code by design. Here no class is looked up and nothing is constructed: an object comes out as the name
-of its class with what the file says about it, and names that the study has no use for are refused. Python's own parsers
-do not serve: the unpickler allocates by a memo's number and hashes nested keys without end, and pickletools refuses
-strings with bytes above 127.
+Unpickling runs code by design. Here no class is looked up and no object is constructed: an object is returned as the
+name of its class with the content of the file, and names that the study does not need are refused. Python's own parsers
+are unsuitable: the unpickler allocates memory by a memo's number and hashes nested keys without end, and pickletools
+refuses strings with bytes above 127.
 """
 
 import re
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from navirl_cli.errors import ArtefactError
 
-#: Whoever may be named, by module and name: messages of ROS, arrays of numpy, tensors of torch, the study's own.
+#: The names allowed, by module: messages of ROS, arrays of numpy, tensors of torch, the study's own classes.
 NAMES: Final = frozenset(
     {
         "__builtin__.object",
@@ -40,11 +40,11 @@ NAMES: Final = frozenset(
         "torch.storage._load_from_bytes",
     }
 )
-#: Fifty times what a published file takes; at 200 bytes each, far from filling any memory.
+#: Fifty times the operations of a published file; at 200 bytes each they need little memory.
 MOST_OPERATIONS: Final = 1_000_000
 
 _RECONSTRUCTOR: Final = "copy_reg._reconstructor"
-_WHOLE: Final = re.compile(rb"-?\d{1,19}")
+_INTEGER: Final = re.compile(rb"-?\d{1,19}")
 #: No float that Python writes is longer.
 _FLOAT_LENGTH: Final = 40
 #: A string's repr: printable ASCII, and the escapes that Python 2 writes.
@@ -60,7 +60,7 @@ class Name:
 
 @dataclass(slots=True)
 class Kept:
-    """What a pickle says of an object, in place of the object."""
+    """The description of an object in a pickle, in place of the object."""
 
     #: Full name of its class, or of the function that would make it.
     name: str
@@ -69,26 +69,26 @@ class Kept:
 
 
 class _BrokenError(Exception):
-    """What was found in place of a pickle of protocol 0."""
+    """The content is no pickle of protocol 0; the text is part of a message."""
 
 
 class _RefusedError(Exception):
-    """A name that nothing in the study has."""
+    """A name that the study does not need."""
 
 
 def read_pickle(data: bytes, name: str) -> Any:
-    """What a pickle says, without making or running anything that it names.
+    """The content of a pickle, without making or running anything that it names.
 
     Args:
         data: The file's bytes.
         name: The file, for messages.
 
     Returns:
-        Lists, tuples, dictionaries (of texts and whole numbers), texts (bytes as latin-1), numbers, truth values, None,
-        `Name` and `Kept`. Parts may be shared, and lists may hold themselves.
+        Lists, tuples, dictionaries (with texts and integers as keys), texts (bytes as latin-1), numbers, booleans,
+        None, `Name` and `Kept`. Parts may be shared, and lists may contain themselves.
 
     Raises:
-        ArtefactError: It is no pickle of protocol 0, is cut off, or names what the study has no use for.
+        ArtefactError: It is no pickle of protocol 0, is truncated, or holds a name that the study does not need.
     """
     machine = _Machine(data)
     try:
@@ -96,12 +96,12 @@ def read_pickle(data: bytes, name: str) -> Any:
     except _RefusedError as error:
         raise ArtefactError(
             f"{name}: expected only names that the published study needs, found {error} before byte {machine.at}; "
-            "nothing was run; fetch the file from its authors anew"
+            "no code was run; download the file from its authors again"
         ) from None
     except _BrokenError as error:
         raise ArtefactError(
             f"{name}: expected a pickle of protocol 0, as the study is published, found {error} before byte "
-            f"{machine.at} of {len(data)}; fetch the file from its authors anew"
+            f"{machine.at} of {len(data)}; download the file from its authors again"
         ) from None
 
 
@@ -112,12 +112,12 @@ class _Machine:
         self.data = data
         self.at = 0
         self.stack: list[Any] = []
-        #: What lay on the stack when each open mark was set.
+        #: The stack below each open mark.
         self.below: list[list[Any]] = []
         self.memo: dict[bytes, Any] = {}
 
     def run(self) -> Any:
-        """Every operation up to the end."""
+        """Run the operations up to the end."""
         data, steps = self.data, _STEPS
         for _ in range(MOST_OPERATIONS):
             if self.at >= len(data):
@@ -133,9 +133,9 @@ class _Machine:
         raise _BrokenError(f"more than {MOST_OPERATIONS} operations")
 
     def result(self) -> Any:
-        """The only value that is left."""
+        """The only remaining value."""
         if self.at < len(self.data) or len(self.stack) != 1 or self.below:
-            raise _BrokenError("something left over at its end")
+            raise _BrokenError("more than one value at its end")
         return self.stack[0]
 
     def line(self) -> bytes:
@@ -154,14 +154,14 @@ class _Machine:
             raise _BrokenError("an operation without its operand")
         return self.stack.pop()
 
-    def top(self, kind: type[Any]) -> Any:
-        """The topmost value, which stays, if it is of a kind."""
-        if not self.stack or type(self.stack[-1]) is not kind:
-            raise _BrokenError(f"an operation on no {kind.__name__.lower()}")
+    def top(self, wanted: type[Any]) -> Any:
+        """The topmost value, which stays, if it is of a type."""
+        if not self.stack or type(self.stack[-1]) is not wanted:
+            raise _BrokenError(f"an operation on no {wanted.__name__.lower()}")
         return self.stack[-1]
 
     def marked(self) -> list[Any]:
-        """What lies above the last mark, which goes."""
+        """The values above the last mark, which is removed."""
         if not self.below:
             raise _BrokenError("an operation without its mark")
         items, self.stack = self.stack, self.below.pop()
@@ -175,21 +175,21 @@ class _Machine:
         return Name(name)
 
     def mark(self) -> None:
-        """MARK: what follows belongs together."""
+        """MARK: the next values belong together."""
         self.below.append(self.stack)
         self.stack = []
 
     def put(self) -> None:
         """PUT: remember the topmost value."""
         if not self.stack:
-            raise _BrokenError("nothing to remember")
+            raise _BrokenError("no value to remember")
         self.memo[self.line()] = self.stack[-1]
 
     def get(self) -> None:
         """GET: a value that was remembered."""
         key = self.line()
         if key not in self.memo:
-            raise _BrokenError("a reference to nothing")
+            raise _BrokenError("a reference to no value")
         self.stack.append(self.memo[key])
 
     def append(self) -> None:
@@ -203,7 +203,7 @@ class _Machine:
         self.top(dict).update(_entries([key, value]))
 
     def reduce(self) -> Kept:
-        """REDUCE: would call; here what would be called is kept with its arguments."""
+        """REDUCE: would call a function; here its name is kept with the arguments."""
         args, called = self.pop(), self.pop()
         if type(args) is not tuple or type(called) is not Name:
             raise _BrokenError("a call of no name")
@@ -211,7 +211,7 @@ class _Machine:
         return Kept(made.name) if made else Kept(called.name, args)
 
     def instance(self) -> Kept:
-        """INST: would construct; here the class's name is kept with the arguments."""
+        """INST: would construct an object; here the class's name is kept with the arguments."""
         return Kept(self.name().name, tuple(self.marked()))
 
     def build(self) -> None:
@@ -221,19 +221,19 @@ class _Machine:
 
 
 def _entries(items: list[Any]) -> dict[Any, Any]:
-    """A dictionary of keys and values in turn; keys that hold others may take for ever to hash."""
+    """A dictionary of keys and values in turn; hashing nested keys might never end."""
     keys = items[::2]
     if len(items) % 2 or not all(type(key) in {str, int} for key in keys):
-        raise _BrokenError("a dictionary's key that is neither text nor whole number")
+        raise _BrokenError("a dictionary's key that is neither text nor integer")
     return dict(zip(keys, items[1::2], strict=True))
 
 
-def _whole(line: bytes) -> int | bool:
-    """An INT's or LONG's number; protocol 0 writes truth values as 00 and 01."""
+def _integer(line: bytes) -> int | bool:
+    """An INT's or LONG's number; protocol 0 writes booleans as 00 and 01."""
     if line in {b"00", b"01"}:
         return line == b"01"
-    if not _WHOLE.fullmatch(line):
-        raise _BrokenError("no whole number of at most 19 digits")
+    if not _INTEGER.fullmatch(line):
+        raise _BrokenError("no integer of at most 19 digits")
     return int(line)
 
 
@@ -265,7 +265,7 @@ def _pushes(value: Callable[[_Machine], Any]) -> Callable[[_Machine], None]:
     """An operation that puts a value on the stack."""
 
     def step(machine: _Machine) -> None:
-        made = value(machine)  # first, for it may exchange the stack
+        made = value(machine)  # first, because it may exchange the stack
         machine.stack.append(made)
 
     return step
@@ -276,8 +276,8 @@ _STEPS: Final[dict[int, Callable[[_Machine], None]]] = {
     ord(code): step
     for code, step in {
         "(": _Machine.mark,
-        "I": _pushes(lambda machine: _whole(machine.line())),
-        "L": _pushes(lambda machine: _whole(machine.line().removesuffix(b"L"))),
+        "I": _pushes(lambda machine: _integer(machine.line())),
+        "L": _pushes(lambda machine: _integer(machine.line().removesuffix(b"L"))),
         "F": _pushes(lambda machine: _float(machine.line())),
         "S": _pushes(lambda machine: _string(machine.line())),
         "V": _pushes(lambda machine: _unicode(machine.line())),

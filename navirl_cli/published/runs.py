@@ -26,12 +26,12 @@ class Run:
     place: str
     #: Bytes by file name.
     files: Mapping[str, bytes]
-    #: What could not be read, in words.
+    #: Unreadable files, in words.
     lost: tuple[str, ...] = ()
 
 
 def is_wanted(name: str) -> bool:
-    """Whether a file of this name is part of the study; copies that begin with a dot are a file system's."""
+    """Whether a file of this name is part of the study; names with a leading dot are a file system's."""
     return name in EXPECTED or (name.endswith(TIMES) and not name.startswith("."))
 
 
@@ -43,20 +43,20 @@ def runs_in(path: Path) -> tuple[list[Run], list[str]]:
             one participant's folder.
 
     Returns:
-        Participants, and what was left out, in words.
+        Participants, and data left out, in words.
 
     Raises:
-        ArtefactError: There are none, or the archive cannot be read.
+        ArtefactError: No participant is found, or the archive cannot be read.
     """
     if not path.exists():
-        raise ArtefactError(f"{path}: expected the study's archive or folder, found nothing there; check the path")
+        raise ArtefactError(f"{path}: expected the study's archive or folder, found neither; check the path")
     runs, lost = (_in_folder(path), []) if path.is_dir() else _in_archive(path)
     usable = [run for run in runs if run.name.isprintable()]
-    lost += [f"{run.place!r}: its name cannot be written; left out" for run in runs if run not in usable]
+    lost += [f"{run.place!r}: its name is not printable; left out" for run in runs if run not in usable]
     if not usable:
         raise ArtefactError(
             f"{path}: expected the study's archive (runs.tar.gz), or the folder into which it was unpacked, with a "
-            f"folder for each participant that holds {DEMONSTRATIONS[0]}, found none; give the one or the other"
+            f"folder for each participant that holds {DEMONSTRATIONS[0]}, found none; give one of the two"
         )
     return sorted(usable, key=lambda run: run.name), lost
 
@@ -71,12 +71,12 @@ def _in_folder(root: Path) -> list[Run]:
 
 
 def _folders(root: Path) -> Sequence[Path]:
-    """The folders in a folder, if there is one."""
+    """The folders in a folder, which may be missing."""
     return [path for path in _listed(root) if path.is_dir()] if root.is_dir() else []
 
 
 def _listed(folder: Path) -> list[Path]:
-    """What a folder holds, in order."""
+    """The content of a folder, in order."""
     try:
         return sorted(folder.iterdir())
     except OSError as error:
@@ -86,7 +86,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _run_of(folder: Path) -> Run | None:
-    """The files of a participant's folder; None where it is none."""
+    """The files of a participant's folder; None for another folder."""
     files, lost = {}, []
     try:
         paths = sorted(path for path in folder.iterdir() if is_wanted(path.name))
@@ -99,7 +99,9 @@ def _run_of(folder: Path) -> Run | None:
             if path.is_file() and path.stat().st_size <= MOST_OF_A_FILE:
                 files[path.name] = path.read_bytes()
             else:
-                lost.append(f"{path}: expected a file of at most {MOST_OF_A_FILE >> 20} MB, found another; left out")
+                lost.append(
+                    f"{path}: expected a file of at most {MOST_OF_A_FILE >> 20} MB, found something else; left out"
+                )
         except OSError as error:
             lost.append(f"{path}: cannot be read: {error.strerror}; left out")
     return Run(folder.resolve().name, str(folder), files, tuple(lost)) if paths else None
@@ -120,12 +122,12 @@ def _in_archive(archive: Path) -> tuple[list[Run], list[str]]:
 
 
 def _check_names(archive: Path, runs: Iterable[Run]) -> None:
-    """Each participant's log is named after their folder."""
+    """Refuse two participants with one folder's name: logs are named after them."""
     seen: dict[str, str] = {}
     for run in runs:
         if run.name in seen:
             raise ArtefactError(
                 f"{archive}: expected one folder for each participant, found two of {run.name!r} ({seen[run.name]} and "
-                f"{run.place}); unpack it and name one of the folders"
+                f"{run.place}); unpack it and rename one of the folders"
             )
         seen[run.name] = run.place

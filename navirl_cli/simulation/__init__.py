@@ -1,1 +1,1 @@
-"""A robot in a hallway and a person who pushes it, in closed loop, recorded as rosbag2 would, with known truth."""
+"""A robot in a hallway and a person who pushes it, in closed loop, recorded as by rosbag2, with known truth."""

@@ -1,4 +1,4 @@
-"""The robot: it follows a path and lets itself be pushed (Eqs. 1 and 2)."""
+"""The robot: it follows a path and gives way to pushes (Eqs. 1 and 2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 
-#: Length of a time step, s: the rate of the wrench.
+#: Length of a time step, s: that of the wrench's rate.
 STEP_S = 0.01
 FORWARD_M_S = 0.4
 SIDEWAYS_M_S = 0.2
@@ -17,7 +17,7 @@ PULL_PER_S = 0.5
 GAIN_S_KG = 0.015
 #: The robot stops this near to the end of its path, m.
 STOP_M = 0.04
-#: A drive that takes longer has got stuck, s.
+#: A drive that takes longer is stuck, s.
 LIMIT_S = 90.0
 
 #: The person: from time (s), robot position (2,) and velocity (2,) to the velocity v_com that they add (2,), m/s.
@@ -49,7 +49,7 @@ class Path:
         at = np.linspace(0.0, length[-1], count)
         xy = np.stack([np.interp(at, length, axis) for axis in line_m.T], axis=1)
         if smoothing_m > 0:
-            # Reflected through its ends the line keeps them.
+            # reflected through its ends, the line keeps them
             pad = min(count - 1, round(4 * smoothing_m / spacing_m))
             before, after = 2 * xy[0] - xy[pad:0:-1], 2 * xy[-1] - xy[-2 : -pad - 2 : -1]
             long = np.concatenate([before, xy, after])
@@ -65,11 +65,11 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What truly happened on one drive, at steps of 10 ms."""
+    """The true motion of one drive, at steps of 10 ms."""
 
     #: (n, 2) m, map frame.
     xy_m: FloatArray
-    #: (n, 2) m/s, map frame: what the person added.
+    #: (n, 2) m/s, map frame: the velocity that the person added.
     command_m_s: FloatArray
 
     def __len__(self) -> int:
@@ -83,7 +83,7 @@ def drive(path: Path, start_m: FloatArray, steer: Steering, speed_m_s: float = F
     Args:
         path: The path that the navigation follows.
         start_m: (2,) m, map frame.
-        steer: What the person adds.
+        steer: The velocity that the person adds.
         speed_m_s: Velocity along the path, m/s.
 
     Returns:
@@ -102,9 +102,9 @@ def drive(path: Path, start_m: FloatArray, steer: Steering, speed_m_s: float = F
         left = float(np.hypot(*(path.xy_m[-1] - here)))
         if progress >= len(path.xy_m) - 2 and (left < STOP_M or (path.xy_m[-1] - here) @ path.tangent[-1] < 0):
             break
-        # The last stretch is driven slower, so that the robot does not stop from full speed.
+        # slower near the end: the robot does not stop from full speed
         forward = min(speed_m_s, 0.8 * left + 0.05)
         here = here + STEP_S * (forward * path.tangent[progress] + inward * aside + command)
         track.append(here)
-    # a drive that does not arrive in time ends with a step that no command follows
+    # a drive that does not arrive in time ends with a step without a command
     return Drive(np.array(track[: len(commands)]), np.array(commands))

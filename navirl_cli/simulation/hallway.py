@@ -13,7 +13,7 @@ ORIGIN_M = (-5.0, -2.5)
 ROBOT_RADIUS_M = 0.3
 #: Radius of a standing person as an obstacle, m.
 PERSON_RADIUS_M = 0.25
-#: Along y the nominal path, at the centre of a row of cells; along x the start and the goal.
+#: y of the nominal path, at the centre of a row of cells; x of the start and the goal.
 LANE_Y_M = 0.05
 START_X_M, GOAL_X_M = -3.15, 3.15
 #: The first cycle starts this far to the left and to the right of the nominal path (Sec. IV-C).
@@ -45,11 +45,11 @@ def _walls() -> np.ndarray:
     occupied = np.zeros((rows, columns), dtype=bool)
     occupied[:4] = occupied[-4:] = True
     occupied[:, 0] = occupied[:, -1] = True
-    # Niches: a door to each side, and a bay where a bench stands.
+    # niches: a door on each side, and a bay with a bench
     occupied[1:4, 22:32] = False
     occupied[-4:-1, 58:70] = False
     occupied[-4:-2, 12:20] = False
-    # A pillar beside the way, and a bin near the end.
+    # a pillar beside the path, and a bin near the end
     occupied[8:12, 74:78] = True
     occupied[40:43, 34:37] = True
     return occupied

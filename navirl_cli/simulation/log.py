@@ -18,18 +18,18 @@ from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
 from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M
 from navirl_cli.simulation.person import STICK_M_S
 
-#: Name of the metadata record that holds what truly happened; nothing in navirl reads it but tests.
+#: Name of the metadata record that holds the truth; only tests read it.
 TRUTH_RECORD = "navirl.truth"
 #: The clock's zero: the first session starts here, the next an hour later, ns.
 EPOCH_NS = 1_750_000_000_000_000_000
 HOUR_NS = 3_600_000_000_000
-#: Between measurement and recording, ns.
+#: Delay from measurement to receipt, ns.
 LATENCY_NS = (1_000_000, 4_000_000)
 
 
 @dataclass(eq=False)
 class Timeline:
-    """A session laid out in time, at steps of 10 ms."""
+    """A session in time, at steps of 10 ms."""
 
     xy_m: list[FloatArray] = field(default_factory=list)
     #: The person's force on the robot, N, map frame.
@@ -66,7 +66,7 @@ def lay_out(session: protocol.Session) -> Timeline:
         moving = line.steps
         pushed = one.steering / GAIN_S_KG if one.condition is Condition.FORCE else None
         steered = one.steering / STICK_M_S if one.condition is Condition.JOYSTICK else None
-        # The robot stands a few centimetres beside the pass's start, as after any drive back by hand.
+        # the robot stands a few centimetres beside the pass's start, as after a drive back by hand
         blend = np.clip(1 - np.arange(len(one.drive)) * STEP_S / 1.0, 0, 1)[:, None] * (start - one.drive.xy_m[0])
         line.add(Drive(one.drive.xy_m + blend, one.steering), pushed, steered)
         line.spans.append((announced, moving, line.steps))
@@ -124,7 +124,7 @@ def _write(
 
 
 class _Clock:
-    """When the recorder receives what is measured at a step."""
+    """When the recorder receives the measurement of a step."""
 
     def __init__(self, t_ns: IntArray, rng: np.random.Generator) -> None:
         self.t_ns = t_ns
@@ -232,7 +232,7 @@ def _write_transforms(writer: LogWriter, correction: sensors.Poses, odometry: se
 def _truth(
     session: protocol.Session, line: Timeline, t_ns: IntArray, happened: tuple[FloatArray, FloatArray]
 ) -> dict[str, Any]:
-    """What truly happened, for tests: parameters, and of each pass positions and forces every 10 ms."""
+    """The truth, for tests: parameters, and of each pass positions and forces every 10 ms."""
     xy, force = happened
     names = [parameter.name for parameter in session.truth.parameters]
     return {
@@ -255,5 +255,5 @@ def _truth(
 
 
 def _packed(values: FloatArray) -> str:
-    """Whole numbers as base64 of zlib of little-endian int16, (n, 2) row by row."""
+    """Integers as base64 of zlib of little-endian int16, (n, 2) row by row."""
     return base64.b64encode(zlib.compress(values.astype("<i2").tobytes(), 9)).decode()

@@ -1,4 +1,4 @@
-"""The person: what path they want the robot to drive, and how they make it."""
+"""The person: the path that they want the robot to drive, and how they push it there."""
 
 from dataclasses import dataclass, field
 
@@ -12,10 +12,10 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Path
 from navirl_cli.simulation.hallway import PERSON_RADIUS_M, ROBOT_RADIUS_M
 
-#: The published parameters of all participants, in SI units (c0, a_g, a_p, sigma_p), and how people scatter.
+#: The published parameters of all participants, in SI units (c0, a_g, a_p, sigma_p), and their spread over people.
 PUBLISHED = (-54.12586, -0.873514, -4.907188, 1.679499)
 SCATTER = (0.10, 0.25, 0.25, 0.20)
-#: Reaction time, s; time in which a force builds up, s.
+#: Reaction time, s; time constant of a growing force, s.
 REACTION_S = 0.25
 BUILD_UP_S = 0.12
 MOST_FORCE_N = 30.0
@@ -24,7 +24,7 @@ STIFFNESS_N_M = 130.0
 CLEAR_M = ROBOT_RADIUS_M + PERSON_RADIUS_M + 0.1
 #: Arm, two steps toward the robot, and the robot's radius: centre to centre, m.
 REACH_M = 2.4
-#: The person starts to push when the robot is this far off the wanted path, and stops when content, m.
+#: Distance from the wanted path at which the person starts to push, and at which they stop, m.
 OFF_M, CONTENT_M = 0.10, 0.03
 #: The person looks this far ahead along the wanted path, m.
 AHEAD_M = 0.25
@@ -34,24 +34,24 @@ SMOOTHING_M = 0.25
 STICK_M_S = 0.4
 #: Deflection by distance from the wanted path, 1/m.
 STICK_PER_M = 5.0
-#: Draws of a wanted path before the person accepts the side on which the robot wants to pass.
+#: Samples of a wanted path before the person accepts the side on which the robot passes.
 DRAWS = 64
 
 
 def personal_reward(rng: np.random.Generator) -> Reward:
-    """A person's own reward, drawn around the published one."""
+    """A person's own reward, sampled around the published one."""
     factors = np.exp(rng.normal(0.0, SCATTER))
     return Reward(tuple((np.array(PUBLISHED) * factors).tolist()))
 
 
-def drawn_path(scene: Scene, reward: Reward, rng: np.random.Generator, side: float = 0.0) -> Path:
+def sampled_path(scene: Scene, reward: Reward, rng: np.random.Generator, side: float = 0.0) -> Path:
     """A path sampled from a reward's policy, rounded so that a robot can drive it.
 
     Args:
         scene: Start, goal and people.
         reward: Whose policy.
         rng: Source of randomness.
-        side: Positive or negative: the side (as :func:`side_of`) on which the path should pass the person; 0 for any.
+        side: Sign of the side (as :func:`side_of`) on which the path should pass the person; 0 for either.
     """
     policy = policy_of(reward, scene)
     samples = sample_paths(policy, scene.start, DRAWS, rng)
@@ -63,7 +63,7 @@ def drawn_path(scene: Scene, reward: Reward, rng: np.random.Generator, side: flo
 
 
 def _pushed_clear(line_m: FloatArray, person_m: FloatArray) -> FloatArray:
-    """The line with what would touch the person moved straight away from them, as obstacle avoidance does."""
+    """The line, with points that would touch the person moved straight away from them, as by obstacle avoidance."""
     away = line_m - person_m
     distance = np.hypot(*away.T)[:, None]
     outward = np.where(distance > 1e-6, away / np.maximum(distance, 1e-6), (0.0, 1.0))
@@ -102,7 +102,7 @@ class Hand:
             target = target + 0.12 * np.hypot(*target) * self._tremor
         self._effort = self._effort + (target - self._effort) * STEP_S / BUILD_UP_S
         if not self._pushing and np.hypot(*self._effort) < 0.02:
-            self._effort = np.zeros(2)  # the hand has left the handle
+            self._effort = np.zeros(2)  # the hand leaves the handle
         return self.effort_to_velocity() * self._effort
 
     def effort_to_velocity(self) -> float:
@@ -126,5 +126,5 @@ class Hand:
 
 
 def no_hand(_t_s: float, _xy_m: FloatArray) -> FloatArray:
-    """Nobody touches the robot."""
+    """No person touches the robot."""
     return np.zeros(2)

@@ -32,7 +32,7 @@ BACK_ASIDE_M = 1.3
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """One trial as it truly was."""
+    """One trial as it truly happened."""
 
     condition: Condition
     cycle: int | None
@@ -47,13 +47,13 @@ class Pass:
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """All passes of a participant, and who they are."""
+    """All passes of a participant."""
 
     name: str
     hallway: Hallway
-    #: What the participant truly wants.
+    #: The participant's true reward.
     truth: Reward
-    #: What the robot learnt after the first cycle.
+    #: The reward learnt after the first cycle.
     learnt: Reward
     passes: tuple[Pass, ...]
 
@@ -71,10 +71,10 @@ def session(number: int, seed: int) -> Session:
     first = [_pushed(hallway, truth, _nominal(), offset, 1, rng) for offset in _either_first(rng)]
     demonstrations = [_as_demonstration(hallway, one, f"{number}/{i}") for i, one in enumerate(first)]
     exact = fit(evidence_of(demonstrations), Reward.named({})).reward.theta
-    # Six digits: the last ones differ between machines, and a path drawn from them could take the other side.
+    # six digits: the last ones differ between machines, and a sampled path could pass on the other side
     learnt = Reward(tuple(float(f"{value:.6g}") for value in exact))
     scene = _scene(hallway, 0.0)
-    second = [_pushed(hallway, truth, person.drawn_path(scene, learnt, rng), 0.0, 2, rng) for _ in range(2)]
+    second = [_pushed(hallway, truth, person.sampled_path(scene, learnt, rng), 0.0, 2, rng) for _ in range(2)]
     joystick = [_steered(hallway, truth, rng) for _ in range(2)]
     around = Path.along(avoidance_line_m(scene, ROBOT_RADIUS_M + PERSON_RADIUS_M), person.SMOOTHING_M / 2)
     alone = Pass(Condition.AUTONOMOUS, None, around, drive(around, around.xy_m[0], person.no_hand))
@@ -84,8 +84,8 @@ def session(number: int, seed: int) -> Session:
 def drive_back(from_m: FloatArray, to_m: FloatArray) -> Drive:
     """The experimenter drives the robot back to a start, past the person at a distance."""
     aside = LANE_Y_M + BACK_ASIDE_M
-    way = Path.along(np.array([from_m, (1.6, aside), (-1.6, aside), to_m]), 0.3)
-    return drive(way, from_m, person.no_hand, BACK_M_S)
+    path = Path.along(np.array([from_m, (1.6, aside), (-1.6, aside), to_m]), 0.3)
+    return drive(path, from_m, person.no_hand, BACK_M_S)
 
 
 def standing(at_m: FloatArray, seconds: float) -> Drive:
@@ -100,7 +100,7 @@ def _either_first(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _nominal() -> Path:
-    """The straight way."""
+    """The straight path."""
     return Path.along(np.array([(START_X_M, LANE_Y_M), (GOAL_X_M, LANE_Y_M)]))
 
 
@@ -113,22 +113,22 @@ def _scene(hallway: Hallway, offset_m: float) -> Scene:
 def _pushed(hallway: Hallway, truth: Reward, plan: Path, offset_m: float, cycle: int, rng: np.random.Generator) -> Pass:
     """A pass in which the person may push the robot off its plan."""
     side = person.side_of(plan.xy_m, hallway.person_m) if cycle > 1 else offset_m
-    wanted = person.drawn_path(_scene(hallway, offset_m), truth, rng, side)
+    wanted = person.sampled_path(_scene(hallway, offset_m), truth, rng, side)
     hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=True)
     start = np.array([START_X_M, LANE_Y_M + offset_m])
     return Pass(Condition.FORCE, cycle, plan, drive(plan, start, hand))
 
 
 def _steered(hallway: Hallway, truth: Reward, rng: np.random.Generator) -> Pass:
-    """A pass in which the person corrects the straight way with a joystick."""
+    """A pass in which the person corrects the straight path with a joystick."""
     plan = _nominal()
-    wanted = person.drawn_path(_scene(hallway, 0.0), truth, rng)
+    wanted = person.sampled_path(_scene(hallway, 0.0), truth, rng)
     hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=False)
     return Pass(Condition.JOYSTICK, None, plan, drive(plan, plan.xy_m[0], hand))
 
 
 def _as_demonstration(hallway: Hallway, one: Pass, name: str) -> Demonstration:
-    """What the robot learns from between the cycles."""
+    """A pass as evidence for the fit between the cycles."""
     xy = one.drive.xy_m[::3]
     cells = rasterize(xy, hallway.free)
     zeros = np.zeros(len(xy))

@@ -264,11 +264,9 @@ def _smooth(values: FloatArray, at_s: FloatArray) -> FloatArray:
         at_s: (n,) s, ascending: times of receipt.
     """
     count = max(1, min(-(-len(values) // _LATENCY), int((at_s[-1] - at_s[0]) / _LATENCY_S)))
-    blocks = zip(np.array_split(at_s, count), np.array_split(values, count), strict=True)
     # in time, not in rows: the clock continues across a gap
-    middles, medians = np.array([(np.median(at), np.median(block)) for at, block in blocks]).T
-    middles, first = np.unique(middles, return_index=True)
-    medians = _running_median(medians[first], "odd")
+    middles, first = np.unique(_block_medians(at_s, count), return_index=True)
+    medians = _running_median(_block_medians(values, count)[first], "odd")
     if len(middles) > 1:  # the ends continue as their neighbours do
         apart = np.diff(middles)[[0, -1]]
         beyond = np.clip(at_s[[0, -1]] - middles[[0, -1]], -apart, apart)
@@ -277,3 +275,12 @@ def _smooth(values: FloatArray, at_s: FloatArray) -> FloatArray:
         middles, medians = np.r_[outer[0], middles, outer[1]], np.r_[ends[0], medians, ends[1]]
     smooth: FloatArray = np.interp(at_s, middles, medians)
     return smooth
+
+
+def _block_medians(values: FloatArray, count: int) -> FloatArray:
+    """(count,) medians of blocks of as equal sizes as possible, the longer ones first."""
+    size, longer = divmod(len(values), count)
+    first, rest = np.split(values, [longer * (size + 1)])
+    return np.concatenate(
+        [np.median(first.reshape(longer, size + 1), axis=1), np.median(rest.reshape(-1, size), axis=1)]
+    )
