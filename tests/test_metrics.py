@@ -10,7 +10,7 @@ import pytest
 from path_values import line_values
 
 from navirl_cli.demos.lines import path_length_m
-from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, center_distance_m, onset_m
+from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, areas_m2, center_distance_m, onset_m
 from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric, Need, measure
 
 NOMINAL, PERSON = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[6.0, 0.3]])
@@ -66,6 +66,25 @@ def test_area_against_a_fine_raster_and_an_integral(seed):
     gap = np.abs(np.interp(x, *one.T) - np.interp(x, *other.T))
     assert area == pytest.approx(np.trapezoid(gap, x), rel=1e-6)
     assert area == pytest.approx(area_between_m2(other, one), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_area_beside_a_straight_path_is_that_of_the_faces(seed):
+    # A corner of a nanometre in the nominal path leaves the areas as they are, and the short way to them not.
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform([-0.05 if seed % 2 else 0.0, -0.2], [0.3, 0.2], (20, 40, 2))
+    lines = np.cumsum(steps, axis=1) + np.array([0.1, 0.0])
+    nominal = np.array([[0.0, 0.05], [lines[..., 0].max() + 0.1, 0.05]])
+    bent = np.insert(nominal, 1, nominal.mean(axis=0) + np.array([0.0, 1e-9]), axis=0)
+    turn = np.array([[cos(0.3 * seed), -sin(0.3 * seed)], [sin(0.3 * seed), cos(0.3 * seed)]])
+    found, expected = areas_m2(lines @ turn, nominal @ turn), areas_m2(lines @ turn, bent @ turn)
+    assert found == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_path_that_starts_behind_the_nominal_path_or_passes_its_end_has_the_area_of_the_faces():
+    line = np.array([[-1.0, 0.0], [-1.0, 1.0], [5.0, 1.0], [5.0, 0.0]])
+    # The joins of the ends lie on the nominal line itself.
+    assert area_between_m2(line, STRAIGHT) == pytest.approx(6.0)
 
 
 def test_lines_whose_ends_differ_are_joined():
