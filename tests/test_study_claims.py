@@ -136,8 +136,8 @@ def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
         for one in study()
     ]
     claim = titled(claims_of(rows, []), "late avoidance")
-    assert "less autonomous" in claim.asked
-    assert claim.text.startswith("The robot by itself (autonomous) begins")
+    assert "- autonomous" in claim.question
+    assert claim.text.startswith("The robot by itself (autonomous) leaves")
 
 
 def test_claims_without_data_are_left_out():
@@ -156,7 +156,7 @@ def test_expected_paths_are_held_against_those_on_the_grid():
     claims = claims_of(rows, learnt)
     assert [claim.title for claim in claims] == ["goodness of fit"]
     # Length is a feature of the reward, and no evidence of its own.
-    assert [one.what for one in claims[0].differences] == ["min. distance", "area under path"]
+    assert [one.quantity for one in claims[0].differences] == ["min. distance", "area under path"]
     distance = claims[0].differences[0]
     assert distance.paired.mean == pytest.approx(0.02)
     # Each participant has two paths 0.2 m apart: 0.1 m about their mean, with one degree of freedom each.

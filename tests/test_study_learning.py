@@ -71,7 +71,7 @@ def test_the_second_cycle_starts_where_the_first_ended():
 
 def test_a_missing_cycle_is_no_trouble():
     ann, bob, _ = (learn(job) for job in jobs_of([*FIRSTS["ann"], *SECONDS["bob"]], 50, 0))
-    assert (ann.second, ann.first.near, ann.trouble) == (None, None, ())
+    assert (ann.second, ann.first.near, ann.problems) == (None, None, ())
     assert bob.first is None
     assert bob.second.fit.initial == Reward.named({})
 
@@ -81,8 +81,8 @@ def test_what_cannot_be_fitted_is_told_and_the_rest_stands():
     ann = learn(jobs_of([through, *SECONDS["ann"]], 50, 0)[0])
     assert ann.first is None
     assert ann.second is not None
-    assert len(ann.trouble) == 1
-    assert ann.trouble[0].startswith("ann, cycle 1: demonstration ann/10: its path passes the goal's cell")
+    assert len(ann.problems) == 1
+    assert ann.problems[0].startswith("ann, cycle 1: demonstration ann/10: its path passes the goal's cell")
 
 
 def test_a_fit_stands_though_its_paths_cannot_be_compared(monkeypatch):
@@ -93,7 +93,7 @@ def test_a_fit_stands_though_its_paths_cannot_be_compared(monkeypatch):
     ann = learn(jobs_of(ALL, 50, 0)[0])
     assert ann.first.near is None
     assert ann.second.fit.initial == ann.first.fit.reward
-    assert ann.trouble == ("ann, cycle 1: no policy in this scene", "ann, cycle 2: no policy in this scene")
+    assert ann.problems == ("ann, cycle 1: no policy in this scene", "ann, cycle 2: no policy in this scene")
 
 
 def test_published_parameters_are_compared_with_published_paths_only():
@@ -119,10 +119,10 @@ def test_what_a_reader_should_know():
     lines = remarks([*ALL, other, unsaid, aside], [Answer("ann", "q", "", 1), Answer("zoe", "q", "", 1)])
     assert [line.split(":")[0] for line in lines] == [
         "trials are on 2 maps",
-        "robots of radii 0.25, 0.4 m are put together",
+        "robots of radii 0.25, 0.4 m are combined",
         "cycle 3",
-        "1 trials of the condition force say neither cycle nor set",
-        "trials of the condition force in the sets slalom are not fitted, though they say a cycle",
+        "1 trials of the condition force have neither cycle nor set",
+        "trials of the condition force in the sets slalom are not fitted, although they have a cycle",
         "the questionnaire holds answers of participants without a log",
     ]
     assert lines[-1].endswith(" zoe")

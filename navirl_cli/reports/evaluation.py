@@ -55,11 +55,11 @@ def evaluation_text(
     return "\n\n".join(filter(None, [*parts, missing, legend]))
 
 
-def group_table(result: Comparison, metrics: Sequence[Metric], caption: str = "") -> Table:
+def group_table(groups: Sequence[GroupMetrics], metrics: Sequence[Metric], caption: str = "") -> Table:
     """Mean and standard deviation by group and type of path.
 
     Args:
-        result: Metrics by group.
+        groups: The rows.
         metrics: The columns; rows of paths that have none of them are left out.
         caption: Stands above.
     """
@@ -71,10 +71,10 @@ def group_table(result: Comparison, metrics: Sequence[Metric], caption: str = ""
     ]
     rows: list[tuple[Cell, ...]] = [
         (row.group, row.kind, row.count, *(_cell(row, metric) for metric in metrics))
-        for row in result.groups
+        for row in groups
         if any(metric.name in row.mean for metric in metrics)
     ]
-    return Table(tuple(columns), tuple(rows), caption, _missing_note(result.groups, metrics))
+    return Table(tuple(columns), tuple(rows), caption, _missing_note(groups, metrics))
 
 
 def _missing_note(rows: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> str:
@@ -120,7 +120,7 @@ def _gathered(items: Iterable[tuple[Key, str]]) -> dict[Key, list[str]]:
 def _side_by_side(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
     """A table of the metrics of all paths, and one each of those of driven and of learnt paths only."""
     parts = [[metric for metric in metrics if metric.paths == paths] for paths in ("all", "driven", "learnt")]
-    return [table for part in parts if part and (table := group_table(result, part)).rows]
+    return [table for part in parts if part and (table := group_table(result.groups, part)).rows]
 
 
 def _below_each_other(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
