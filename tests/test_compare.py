@@ -1,23 +1,28 @@
 """Demonstrated, learnt and baseline paths side by side."""
 
+import re
 from itertools import pairwise
 
 import factories as make
 import numpy as np
 import oracles
 import pytest
+import shapely
 from path_values import line_values
 from scipy import stats
 
+from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.demos.demonstration import Condition
+from navirl_cli.documents.tables import Format
 from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, KINDS, LEARNT, NOMINAL, ON_GRID, PERSON_RADIUS_M, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import group_of
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import scenes_of
+from navirl_cli.reports.evaluation import evaluation_text
 
 GRID = make.open_grid(40, 21)
 PERSON = np.array([[2.03, 0.98]])
@@ -284,3 +289,22 @@ def test_intervals_of_means_count_participants_not_trials():
     low, high = stats.t.interval(0.95, 2, np.mean(means), stats.sem(means))
     assert group.half_interval["length_m"] == pytest.approx((high - low) / 2)
     assert np.isnan(of(run(trials[:2]), "force, cycle 2", DRIVEN).half_interval["length_m"])
+
+
+def test_a_new_metric_is_its_declaration_and_nothing_else():
+    def furthest_m(lines):
+        distance = shapely.distance(shapely.points(lines.lines_m), shapely.LineString(lines.nominal_m))
+        return distance.max(axis=1)
+
+    toy = Metric("furthest_m", "furthest", "m", "largest distance from the nominal path", lines=furthest_m)
+    metrics = (toy, BY_NAME["length_m"])
+    comparison = run(reward=REWARD, samples=200, metrics=metrics)
+    means = {row.kind: row.mean["furthest_m"] for row in comparison.groups if row.group == "joystick"}
+    assert means[NOMINAL] == pytest.approx(0.0, abs=1e-9)
+    assert means[DRIVEN] == means[ON_GRID] == pytest.approx(0.7)
+    assert 0.2 < means[LEARNT] < 1.0
+    text = evaluation_text(comparison, [], [], metrics, Format.TEXT)
+    assert re.search(r"^joystick +driven +1 +0.700 ", text, re.MULTILINE)
+    assert "furthest: largest distance from the nominal path" in text
+    content = metrics_document(comparison, [], [], metrics, [], Precision(200), 0)
+    assert content["demonstrations"][2]["metrics"]["furthest_m"] == pytest.approx(0.7)

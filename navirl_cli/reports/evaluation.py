@@ -10,7 +10,7 @@ from navirl_cli.artefacts.metrics import Pairs
 from navirl_cli.documents.tables import Cell, Column, Format, Interval, Spread, Table, written
 from navirl_cli.evaluation.compare import DRIVEN, KINDS, LEARNT, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, Metric
+from navirl_cli.evaluation.metrics import METRICS, Metric
 from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
 
@@ -49,7 +49,7 @@ def evaluation_text(
         *([_ranks(ranks)] if ranks else []),
     ]
     parts = [written(table, how) for table in tables if table is not None]
-    left_out = _gathered((reason, BY_NAME[name].label) for name, reason in result.missing.items())
+    left_out = _gathered((result.missing[m.name], m.label) for m in metrics if m.name in result.missing)
     missing = "\n".join(f"Left out: {', '.join(labels)}: {reason}." for reason, labels in left_out.items())
     legend = "\n".join(_legend(result, metrics)) if how is Format.TEXT else ""
     return "\n\n".join(filter(None, [*parts, missing, legend]))
