@@ -1,4 +1,4 @@
-"""What participants say of the paper's claims, on numbers whose answers are known."""
+"""Verdicts on the paper's claims, on numbers whose answers are known."""
 
 from types import SimpleNamespace
 
@@ -130,7 +130,7 @@ def test_replays_that_are_far_are_not_close():
     assert replays.differences[1].verdict is Verdict.FAILS
 
 
-def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
+def test_autonomous_trials_without_a_set_count_as_obstacle_avoidance():
     rows = [
         row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.values[DRIVEN]["onset_m"])
         for one in study()
@@ -169,7 +169,7 @@ def test_the_margin_is_the_scatter_within_participants_whatever_lies_between_the
     assert np.isnan(scatter_within(rows[::2], DRIVEN, "length_m"))
 
 
-def test_who_saw_nobody_takes_no_part():
+def test_trials_without_people_do_not_count():
     rows = [*study(), row("alone", FORCE, distance=float("nan"), area=99.0), row("alone", AVOIDANCE, area=0.0)]
     area = titled(claims_of(rows, []), "smallest area").differences[0]
     assert "alone" not in area.paired.differences

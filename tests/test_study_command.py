@@ -78,7 +78,7 @@ def test_the_pooled_fit_is_that_of_all_second_cycles(summary, demos):
 
 
 def test_metrics_by_condition_are_those_of_evaluate(summary, demos):
-    rows = {row.group: row for row in compare(demos, {}, Precision(), None).groups if row.kind == DRIVEN}
+    rows = {row.group: row for row in compare(demos, {}, Precision(), None).groups if row.path_type == DRIVEN}
     assert set(summary["metrics"]) == set(rows) == {"force, cycle 1", "force, cycle 2", "joystick", "autonomous"}
     for group, row in rows.items():
         driven = summary["metrics"][group]["driven"]
@@ -172,7 +172,7 @@ def test_answers_stand_in_numbers_too(written, summary):
     assert "participants without a log: p04, p05, p06" in written[1].stderr
 
 
-def test_nothing_is_replaced_unasked(navirl, written):
+def test_existing_files_are_kept_without_force(navirl, written):
     out, _ = written
     result = navirl("study", *LOGS, "-o", out, code=1)
     assert "exists already; choose another name, or replace it with --force" in result.stderr
@@ -182,7 +182,7 @@ def test_logs_without_cycles_are_refused(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(wrench_topics=()))
     result = navirl("study", log, "-o", "out", code=1)
     assert (
-        "navirl: a study needs trials of the condition force in cycle 2 and without a set, found none of"
+        "navirl: a study needs trials of the condition force in cycle 2 and without a set, found no trial of"
         in result.stderr
     )
     assert not (tmp_path / "out" / "summary.json").exists()

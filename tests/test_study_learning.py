@@ -69,7 +69,7 @@ def test_the_second_cycle_starts_where_the_first_ended():
     assert everyone.second.fit.initial == Reward.named({})
 
 
-def test_a_missing_cycle_is_no_trouble():
+def test_a_missing_cycle_is_no_problem():
     ann, bob, _ = (learn(job) for job in jobs_of([*FIRSTS["ann"], *SECONDS["bob"]], 50, 0))
     assert (ann.second, ann.first.near, ann.problems) == (None, None, ())
     assert bob.first is None
@@ -131,7 +131,7 @@ def test_what_a_reader_should_know():
 def test_expected_properties_are_those_of_many_paths():
     near = closeness(TRUTH, SECONDS["ann"], 4000, np.random.default_rng(0))
     result = compare(SECONDS["ann"], {"t": TRUTH}, Precision(4000), np.random.default_rng(1))
-    rows = {row.kind: row for row in result.groups}
+    rows = {row.path_type: row for row in result.groups}
     for name in ("length_m", "min_distance_m", "area_m2"):
         assert near.demonstrated.mean[name] == rows[ON_GRID].mean[name]
         assert near.demonstrated.std[name] == rows[ON_GRID].std[name]
@@ -175,13 +175,13 @@ def test_progress_names_whose_fit_is_done():
 
 
 def test_a_study_needs_second_cycles():
-    with pytest.raises(DemonstrationError, match=r"found 2 trials of it \(cycle 1, no set\); say which trial is what"):
+    with pytest.raises(DemonstrationError, match=r"found 2 trials of it \(cycle 1, no set\); describe the trials"):
         study_of(FIRSTS["ann"], {}, 10, 0)
     with pytest.raises(DemonstrationError, match=r"found 8 trials of it \(no cycle, no set\)"):
         study_of([replace(one, cycle=None) for one in ALL], {}, 10, 0)
     with pytest.raises(DemonstrationError, match=r"found 8 trials of it \(cycle 1, main; cycle 2, main\)"):
         study_of([replace(one, set="main") for one in ALL], {}, 10, 0)
-    with pytest.raises(DemonstrationError, match=r"found none of that condition"):
+    with pytest.raises(DemonstrationError, match=r"found no trial of that condition"):
         study_of([replace(one, condition=Condition.JOYSTICK) for one in ALL], {}, 10, 0)
 
 

@@ -19,8 +19,8 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
 
     Args:
         study: The study.
-        cells: Published paths, and whether our cells are the same; empty where none were published.
-        answers: To the questionnaire; none where there is none.
+        cells: Published paths, and whether our cells are the same; empty without published paths.
+        answers: To the questionnaire; empty without one.
     """
     return {
         "participants": {one.participant: _learnt(one) for one in study.participants},
@@ -68,7 +68,7 @@ def _learnt(learnt: Learnt) -> dict[str, Any]:
 
 
 def _cycle(found: CycleFit | None) -> dict[str, Any]:
-    """One cycle's fit and how near its paths come to the second cycle's; nulls where there is none."""
+    """One cycle's fit and how near its paths come to the second cycle's; nulls if the cycle is missing."""
     if found is None:
         return dict.fromkeys(
             (
@@ -121,9 +121,9 @@ def _properties(rows: Iterable[GroupMetrics]) -> dict[str, Any]:
     found: dict[str, dict[str, Any]] = {}
     for row in rows:
         group = found.setdefault(row.group, {"count": row.count, "participants": row.participants})
-        suffix = "" if row.kind == DRIVEN else "_on_grid"
+        suffix = "" if row.path_type == DRIVEN else "_on_grid"
         group[f"missing{suffix}"] = {name: dict(reasons) for name, reasons in row.missing.items()}
-        group["driven" if row.kind == DRIVEN else "on_grid"] = {
+        group["driven" if row.path_type == DRIVEN else "on_grid"] = {
             name: {"mean": number(mean), "standard_deviation": number(row.std[name])} for name, mean in row.mean.items()
         }
     return found

@@ -258,7 +258,7 @@ def _answers_table(bars: Sequence[Shares]) -> Table:
 
 def _properties(groups: Sequence[GroupMetrics]) -> list[Block]:
     """Driven paths by group, and what the columns are."""
-    driven = [row for row in groups if row.kind == DRIVEN]
+    driven = [row for row in groups if row.path_type == DRIVEN]
     caption = "Driven paths of trials with people, mean ± standard deviation over paths."
     definitions = Bullets(tuple(f"{metric.label}: {metric.definition}" for metric in STUDY_METRICS))
     return [group_table(driven, STUDY_METRICS, caption), definitions]

@@ -107,13 +107,13 @@ def _kept(differences: Sequence[Difference | None]) -> tuple[Difference, ...]:
     return tuple(difference for difference in differences if difference is not None)
 
 
-def _of(rows: Sequence[Measured], group: str, name: str, kind: str = DRIVEN) -> Mapping[str, float]:
+def _of(rows: Sequence[Measured], group: str, name: str, path_type: str = DRIVEN) -> Mapping[str, float]:
     """A metric in a group, by participant."""
-    return by_participant([row for row in rows if row.group == group], kind, name)
+    return by_participant([row for row in rows if row.group == group], path_type, name)
 
 
 def _close(
-    rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
+    rows: Sequence[Measured], path_type: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
 ) -> tuple[Difference, ...]:
     """Each metric's values minus the second cycle's, with the scatter within participants as the margin."""
     return _kept(
@@ -122,20 +122,20 @@ def _close(
                 metric.label,
                 metric.unit,
                 one(metric.name),
-                _of(rows, SECOND_CYCLE, metric.name, kind),
-                scatter_within(rows, kind, metric.name),
+                _of(rows, SECOND_CYCLE, metric.name, path_type),
+                scatter_within(rows, path_type, metric.name),
             )
             for metric in metrics
         ]
     )
 
 
-def scatter_within(rows: Sequence[Measured], kind: str, name: str) -> float:
+def scatter_within(rows: Sequence[Measured], path_type: str, name: str) -> float:
     """Pooled standard deviation of a participant's second-cycle paths about their own mean; NaN where all have one."""
     own: dict[str, list[float]] = {}
     for row in rows:
         if row.group == SECOND_CYCLE:
-            own.setdefault(row.participant, []).append(row.values[kind][name])
+            own.setdefault(row.participant, []).append(row.values[path_type][name])
     squares = sum(float(np.var(values)) * len(values) for values in own.values())
     freedom = sum(len(values) - 1 for values in own.values())
     return float(np.sqrt(squares / freedom)) if freedom else float("nan")

@@ -129,5 +129,5 @@ def closeness(
         RewardError: The reward has no policy in a scene.
     """
     found = compare(demonstrations, {LEARNT: reward}, Precision(samples), rng).groups
-    shown, learnt = (next(row for row in found if row.kind == kind) for kind in (ON_GRID, LEARNT))
+    shown, learnt = (next(row for row in found if row.path_type == path_type) for path_type in (ON_GRID, LEARNT))
     return Closeness(shown, learnt)
