@@ -1,23 +1,37 @@
 """Demonstrated, learnt and baseline paths side by side."""
 
+import re
 from itertools import pairwise
 
 import factories as make
 import numpy as np
 import oracles
 import pytest
+import shapely
 from path_values import line_values
 from scipy import stats
 
+from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, KINDS, LEARNT, NOMINAL, ON_GRID, PERSON_RADIUS_M, compare
+from navirl_cli.documents.tables import Format
+from navirl_cli.evaluation.compare import (
+    AVOIDANCE,
+    DRIVEN,
+    LEARNT,
+    NOMINAL,
+    ON_GRID,
+    PATH_TYPES,
+    PERSON_RADIUS_M,
+    compare,
+)
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import group_of
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import scenes_of
+from navirl_cli.reports.evaluation import evaluation_text
 
 GRID = make.open_grid(40, 21)
 PERSON = np.array([[2.03, 0.98]])
@@ -44,8 +58,8 @@ def run(trials=TRIALS, reward=None, samples=10, seed=0, **words):
     return compare(trials, rewards, Precision(samples), np.random.default_rng(seed), **words)
 
 
-def of(comparison, group, kind):
-    (found,) = [one for one in comparison.groups if (one.group, one.kind) == (group, kind)]
+def of(comparison, group, path_type):
+    (found,) = [one for one in comparison.groups if (one.group, one.path_type) == (group, path_type)]
     return found
 
 
@@ -89,7 +103,7 @@ def test_poses_beside_the_centres_change_what_was_driven_but_not_what_is_on_the_
 
 def test_the_baselines_are_the_straight_way_and_the_one_that_keeps_clear():
     comparison = run()
-    nominal, avoidance = (of(comparison, "joystick", kind).mean for kind in (NOMINAL, AVOIDANCE))
+    nominal, avoidance = (of(comparison, "joystick", path_type).mean for path_type in (NOMINAL, AVOIDANCE))
     assert nominal["length_m"] == pytest.approx(3.7)
     assert nominal["area_m2"] == pytest.approx(0.0, abs=1e-12)
     assert nominal["min_distance_m"] == pytest.approx(1.05 - 0.98 - 0.25)
@@ -175,10 +189,10 @@ def test_no_paths_are_drawn_for_what_visits_give_exactly():
 def test_only_metrics_that_are_asked_for_are_computed():
     comparison = run(reward=REWARD, metrics=[BY_NAME["length_m"], BY_NAME["duration_s"]])
     for row in comparison.groups:
-        assert set(row.mean) == ({"length_m", "duration_s"} if row.kind == DRIVEN else {"length_m"}), row.kind
+        assert set(row.mean) == ({"length_m", "duration_s"} if row.path_type == DRIVEN else {"length_m"}), row.path_type
     timed = run(reward=REWARD, metrics=[BY_NAME["duration_s"]])
-    assert {row.kind for row in timed.groups} == {DRIVEN}, "other types of paths have no times"
-    assert {row.kind for row in run(metrics=[BY_NAME["hausdorff_m"]]).groups} == set()
+    assert {row.path_type for row in timed.groups} == {DRIVEN}, "other types of paths have no times"
+    assert {row.path_type for row in run(metrics=[BY_NAME["hausdorff_m"]]).groups} == set()
 
 
 def test_learnt_paths_are_measured_against_each_demonstrations_own_nominal_path():
@@ -210,7 +224,7 @@ def test_nominal_lines_that_differ_within_a_cell_share_learnt_paths():
 def test_every_missing_value_has_a_reason():
     trials = [trial(STRAIGHT, 1, people=make.NOBODY), trial(ROUND, 2, laid_out_m_s=0.4)]
     comparison = run(trials, REWARD)
-    driven, learnt = (of(comparison, "force, cycle 2", kind) for kind in (DRIVEN, LEARNT))
+    driven, learnt = (of(comparison, "force, cycle 2", path_type) for path_type in (DRIVEN, LEARNT))
     assert driven.missing["min_distance_m"] == {"no people in the scene": 1}
     assert driven.missing["speed_m_s"] == {"times not measured": 1}
     assert driven.missing["intimate_s"] == {"no people in the scene": 1, "times not measured": 1}
@@ -218,14 +232,14 @@ def test_every_missing_value_has_a_reason():
     assert learnt.missing["personal_m"] == {"no people in the scene": 1}
     for row in comparison.groups:
         for name, value in row.mean.items():
-            assert np.isfinite(value) or row.count_of(name) == 0, (row.kind, name)
-            assert (row.count_of(name) < row.count) == (name in row.missing), (row.kind, name)
+            assert np.isfinite(value) or row.count_of(name) == 0, (row.path_type, name)
+            assert (row.count_of(name) < row.count) == (name in row.missing), (row.path_type, name)
 
 
 def test_several_rewards_stand_side_by_side():
     comparison = run(reward={"near": REWARD, "far": Reward((-60.0, -0.5, -30.0, 1.0))}, samples=20)
-    kinds = [row.kind for row in comparison.groups if row.group == "joystick"]
-    assert kinds == ["driven", "driven, on grid", "learnt, far", "learnt, near", "nominal", "avoidance"]
+    path_types = [row.path_type for row in comparison.groups if row.group == "joystick"]
+    assert path_types == ["driven", "driven, on grid", "learnt, far", "learnt, near", "nominal", "avoidance"]
     far, near = (of(comparison, "joystick", f"learnt, {name}") for name in ("far", "near"))
     assert far.mean["min_distance_m"] > near.mean["min_distance_m"]
 
@@ -244,9 +258,9 @@ def test_groups_can_be_made_by_other_fields():
 
 def test_groups_come_in_the_order_of_the_table():
     comparison = run(reward=REWARD, samples=2)
-    kinds = list(KINDS)
-    assert [(one.group, one.kind) for one in comparison.groups] == [
-        (group, kind) for group in ("force, cycle 2", "joystick") for kind in kinds
+    path_types = list(PATH_TYPES)
+    assert [(one.group, one.path_type) for one in comparison.groups] == [
+        (group, path_type) for group in ("force, cycle 2", "joystick") for path_type in path_types
     ]
 
 
@@ -284,3 +298,22 @@ def test_intervals_of_means_count_participants_not_trials():
     low, high = stats.t.interval(0.95, 2, np.mean(means), stats.sem(means))
     assert group.half_interval["length_m"] == pytest.approx((high - low) / 2)
     assert np.isnan(of(run(trials[:2]), "force, cycle 2", DRIVEN).half_interval["length_m"])
+
+
+def test_a_new_metric_is_its_declaration_and_nothing_else():
+    def furthest_m(lines):
+        distance = shapely.distance(shapely.points(lines.lines_m), shapely.LineString(lines.nominal_m))
+        return distance.max(axis=1)
+
+    toy = Metric("furthest_m", "furthest", "m", "largest distance from the nominal path", lines=furthest_m)
+    metrics = (toy, BY_NAME["length_m"])
+    comparison = run(reward=REWARD, samples=200, metrics=metrics)
+    means = {row.path_type: row.mean["furthest_m"] for row in comparison.groups if row.group == "joystick"}
+    assert means[NOMINAL] == pytest.approx(0.0, abs=1e-9)
+    assert means[DRIVEN] == means[ON_GRID] == pytest.approx(0.7)
+    assert 0.2 < means[LEARNT] < 1.0
+    text = evaluation_text(comparison, [], [], metrics, Format.TEXT)
+    assert re.search(r"^joystick +driven +1 +0.700 ", text, re.MULTILINE)
+    assert "furthest: largest distance from the nominal path" in text
+    content = metrics_document(comparison, [], [], metrics, [], Precision(200), 0)
+    assert content["demonstrations"][2]["metrics"]["furthest_m"] == pytest.approx(0.7)

@@ -8,12 +8,12 @@ from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import Measured, by_participant, mean_and_spread, student_half_width, summary_of
 
 
-def row(participant, length, onset=np.nan, kind=DRIVEN):
-    missing = {kind: {} if np.isfinite(onset) else {"onset_m": "never leaves"}}
-    return Measured("", participant, "joystick", {kind: {"length_m": length, "onset_m": onset}}, missing)
+def row(participant, length, onset=np.nan, path_type=DRIVEN):
+    missing = {path_type: {} if np.isfinite(onset) else {"onset_m": "never leaves"}}
+    return Measured("", participant, "joystick", {path_type: {"length_m": length, "onset_m": onset}}, missing)
 
 
-ROWS = [row("a", 1.0), row("a", 2.0, 0.5), row("b", 4.0), row("c", 7.0, kind=ON_GRID)]
+ROWS = [row("a", 1.0), row("a", 2.0, 0.5), row("b", 4.0), row("c", 7.0, path_type=ON_GRID)]
 
 
 def test_participants_count_with_their_means():

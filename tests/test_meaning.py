@@ -9,7 +9,7 @@ from navirl_cli.evaluation.meaning import (
     accepted_detour_m,
     beside_detour_m,
     half_distance_m,
-    longer_way_odds,
+    longer_path_odds,
     meanings,
     passing_penalty,
     tenth_distance_m,
@@ -42,7 +42,7 @@ def test_an_accepted_detour_costs_what_the_distance_gains():
 
 
 def test_longer_ways_and_ways_beside_the_path():
-    assert longer_way_odds(THETA) == pytest.approx(exp(-5.4))
+    assert longer_path_odds(THETA) == pytest.approx(exp(-5.4))
     # Ten steps of 10 cm at half a metre cost 10 a_g / 4.
     assert -THETA["c0"] * beside_detour_m(THETA, 0.1) == pytest.approx(10 * 0.9 * 0.25)
 
@@ -64,7 +64,7 @@ def test_intervals_follow_the_covariance():
     assert np.isnan([odds.lower, odds.upper]).all()
 
 
-def test_the_same_seed_gives_the_same_intervals_and_nobody_passed_no_detour():
+def test_the_same_seed_gives_the_same_intervals_and_without_people_there_is_no_detour():
     covariance = np.diag([9.0, 0.04, 0.5, 0.04])
     one, two = (meanings(REWARD, covariance, 0.1, 0.7, np.random.default_rng(3)) for _ in range(2))
     assert one == two

@@ -10,12 +10,12 @@ import pytest
 from path_values import line_values
 
 from navirl_cli.demos.lines import path_length_m
-from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, center_distance_m, onset_m
+from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, areas_m2, center_distance_m, onset_m
 from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric, Need, measure
 
 NOMINAL, PERSON = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[6.0, 0.3]])
 STRAIGHT = np.array([[0.0, 0.0], [4.0, 0.0]])
-NOBODY = np.zeros((0, 2))
+NO_PEOPLE = np.zeros((0, 2))
 
 
 def wavy(seed, poses=60):
@@ -68,6 +68,25 @@ def test_area_against_a_fine_raster_and_an_integral(seed):
     assert area == pytest.approx(area_between_m2(other, one), rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_the_area_beside_a_straight_path_is_that_of_the_faces(seed):
+    # A corner of a nanometre in the nominal path does not change the areas, but asks for the faces.
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform([-0.05 if seed % 2 else 0.0, -0.2], [0.3, 0.2], (20, 40, 2))
+    lines = np.cumsum(steps, axis=1) + np.array([0.1, 0.0])
+    nominal = np.array([[0.0, 0.05], [lines[..., 0].max() + 0.1, 0.05]])
+    bent = np.insert(nominal, 1, nominal.mean(axis=0) + np.array([0.0, 1e-9]), axis=0)
+    turn = np.array([[cos(0.3 * seed), -sin(0.3 * seed)], [sin(0.3 * seed), cos(0.3 * seed)]])
+    found, expected = areas_m2(lines @ turn, nominal @ turn), areas_m2(lines @ turn, bent @ turn)
+    assert found == pytest.approx(expected, abs=1e-7)
+
+
+def test_a_path_that_starts_behind_the_nominal_path_or_passes_its_end_has_the_area_of_the_faces():
+    line = np.array([[-1.0, 0.0], [-1.0, 1.0], [5.0, 1.0], [5.0, 0.0]])
+    # The joins of the ends lie on the nominal line itself.
+    assert area_between_m2(line, STRAIGHT) == pytest.approx(6.0)
+
+
 def test_lines_whose_ends_differ_are_joined():
     shifted = STRAIGHT + np.array([0.0, 0.5])
     assert area_between_m2(shifted, STRAIGHT) == pytest.approx(2.0)
@@ -106,13 +125,13 @@ def test_a_person_within_the_shell_gives_a_negative_distance():
 
 
 def test_without_people_there_is_no_distance():
-    found = line_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
+    found = line_values(STRAIGHT, STRAIGHT, NO_PEOPLE, 0.25)
     assert np.isnan(found["min_distance_m"])
     assert found["length_m"] == 4.0
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.9, -2.4])
-def test_turning_and_moving_the_world_changes_nothing(angle):
+def test_values_do_not_depend_on_the_frame(angle):
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
     line, nominal, people = wavy(3), wavy(4), np.array([[2.0, 0.7]])
     there = [points @ turn.T + [30.0, -7.0] for points in (line, nominal, people)]
@@ -149,7 +168,7 @@ def test_only_what_is_asked_for_is_computed():
 
     costly = Metric("costly_m", "costly", "m", "", lines=fail)
     for_people = Metric("near_m", "near", "m", "", needs=(Need.PEOPLE,), lines=fail)
-    lines = Lines(STRAIGHT[None], STRAIGHT, NOBODY, 0.25)
+    lines = Lines(STRAIGHT[None], STRAIGHT, NO_PEOPLE, 0.25)
     values, missing = measure([BY_NAME["length_m"], for_people], lines, {Need.PEOPLE})
     assert values == pytest.approx({"length_m": 4.0, "near_m": np.nan}, nan_ok=True)
     assert missing == {"near_m": "no people in the scene"}
@@ -182,25 +201,25 @@ def test_zones_shares_and_mean_distance_of_a_straight_line():
 
 def test_heading_changes_and_curvature():
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 0.0], [4.0, 0.0]])
-    found = line_values(square, STRAIGHT, NOBODY, 0.25)
+    found = line_values(square, STRAIGHT, NO_PEOPLE, 0.25)
     assert found["heading_rad"] == pytest.approx(4 * pi / 2)
     assert found["curvature_1_m"] == pytest.approx(4 * pi / 2 / 6)
     angles = np.linspace(pi, 0, 2001)
     arc = np.stack([1 + np.cos(angles), np.sin(angles)], axis=1)
-    assert line_values(arc, STRAIGHT, NOBODY, 0.25)["heading_rad"] == pytest.approx(pi, rel=0.05)
-    assert line_values(arc, STRAIGHT, NOBODY, 0.25)["curvature_1_m"] == pytest.approx(1.0, rel=0.05)
+    assert line_values(arc, STRAIGHT, NO_PEOPLE, 0.25)["heading_rad"] == pytest.approx(pi, rel=0.05)
+    assert line_values(arc, STRAIGHT, NO_PEOPLE, 0.25)["curvature_1_m"] == pytest.approx(1.0, rel=0.05)
 
 
-def test_shaking_in_place_turns_nothing():
+def test_shaking_in_place_is_no_heading_change():
     rng = np.random.default_rng(0)
     line = np.stack([np.linspace(0, 4, 400), rng.normal(0, 0.002, 400)], axis=1)
-    assert line_values(line, STRAIGHT, NOBODY, 0.25)["heading_rad"] < 2.0
+    assert line_values(line, STRAIGHT, NO_PEOPLE, 0.25)["heading_rad"] < 2.0
     standing = np.concatenate([line, line[-1] + rng.normal(0, 0.01, (300, 2))])
-    assert line_values(standing, STRAIGHT, NOBODY, 0.25)["heading_rad"] < 3.0
+    assert line_values(standing, STRAIGHT, NO_PEOPLE, 0.25)["heading_rad"] < 3.0
 
 
 def test_without_people_there_are_no_zones():
-    found = line_values(STRAIGHT, STRAIGHT, NOBODY, 0.25)
+    found = line_values(STRAIGHT, STRAIGHT, NO_PEOPLE, 0.25)
     for name in ("mean_distance_m", "compliance", "intimate_m", "public_share"):
         assert np.isnan(found[name]), name
 
@@ -229,7 +248,7 @@ def test_the_first_person_counts_and_the_onset_may_lie_behind():
     [
         ([[0.0, 0.0], [5.0, LEAVES_M], [10.0, 0.0]], PERSON),  # never leaves
         ([[0.0, 0.4], [5.0, 0.4], [10.0, 0.0]], PERSON),  # starts away
-        ([[0.0, 0.0], [5.0, 1.0], [10.0, 0.0]], np.zeros((0, 2))),  # nobody is there
+        ([[0.0, 0.0], [5.0, 1.0], [10.0, 0.0]], np.zeros((0, 2))),  # no people
     ],
 )
 def test_some_paths_have_no_onset(line, people):

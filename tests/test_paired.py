@@ -67,9 +67,9 @@ def test_pairs_that_do_not_differ():
     found = compare(np.zeros(5))
     assert (found.mean, found.bootstrap.lower, found.bootstrap.upper) == (0.0, 0.0, 0.0)
     assert np.isnan([found.wilcoxon_p, found.cohen_dz, found.rank_biserial]).all()
-    nobody = paired({}, {}, np.random.default_rng(0))
-    assert nobody.n == 0
-    assert np.isnan([nobody.mean, nobody.wilcoxon_p]).all()
+    empty = paired({}, {}, np.random.default_rng(0))
+    assert empty.n == 0
+    assert np.isnan([empty.mean, empty.wilcoxon_p]).all()
 
 
 def test_the_same_seed_gives_the_same_interval():

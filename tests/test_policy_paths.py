@@ -45,8 +45,8 @@ def test_drawn_paths_are_measured_as_lines(drawn, values):
         assert values["length_m"][number] == pytest.approx(path_length_m(one))
         assert values["min_distance_m"][number] == pytest.approx(center_distance_m(one, PEOPLE) - 0.25)
         assert values["area_m2"][number] == pytest.approx(area_between_m2(one, NOMINAL), abs=1e-12)
-        ways = [values[f"{name}_m"][number] for name, _ in ZONES]
-        assert sum(ways) == pytest.approx(values["length_m"][number])
+        lengths = [values[f"{name}_m"][number] for name, _ in ZONES]
+        assert sum(lengths) == pytest.approx(values["length_m"][number])
 
 
 def test_turns_are_those_between_Segments(drawn, values):

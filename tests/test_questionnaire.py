@@ -84,9 +84,7 @@ def test_what_is_no_level_is_refused(read, answer, levels):
 
 
 def test_no_answer_is_refused_with_what_to_do(read):
-    with pytest.raises(
-        ArtefactError, match=r"line 2, column answer: .*, found nothing; remove the line of who gave no"
-    ):
+    with pytest.raises(ArtefactError, match=r"line 2, column answer: .*, found nothing; remove the line"):
         read(HEADER + "p01,Fun?,force,\n")
 
 
@@ -134,7 +132,9 @@ def test_a_second_answer_to_the_same_question_is_refused(read):
 
 
 def test_a_header_alone_is_refused(read):
-    with pytest.raises(ArtefactError, match=r"answers\.csv: expected answers below the header, found none; add a line"):
+    with pytest.raises(
+        ArtefactError, match=r"answers\.csv: expected answers below the header, found none; add one line"
+    ):
         read(HEADER)
 
 

@@ -54,7 +54,7 @@ def test_sampled_paths_have_the_likelihood_of_their_moves():
 
 
 def test_a_path_that_the_policy_never_takes_ranks_last():
-    # Under a reward that grows steep a long way round has a probability of nothing.
+    # Under a steep reward a long detour has a probability of zero.
     far = [[2, 10], [2, 9], *[[c, 8] for c in range(3, 37)], [37, 9], [37, 10]]
     one = make.demonstration(SCENE.lattice.grid, far, SCENE.people_m)
     (found,) = ranks_of([one], Reward((-2000.0, -0.8, -4.0, 2.0)), 100, np.random.default_rng(0))

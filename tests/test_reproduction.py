@@ -119,14 +119,14 @@ def test_the_summary_holds_the_same_means(summary):
 
 def test_the_log_likelihood_at_the_published_parameters(summary):
     expected = sum(EXPECTED["runs"][run]["force_demos/passing_2"]["published"]["log_likelihood"] for run in RUNS)
-    told = summary["published"]
-    assert told["log_likelihood_at_theta"] == pytest.approx(expected, rel=1e-6)
-    assert list(told["theta"].values()) == pytest.approx(list(EXPECTED["theta_published_si"].values()), rel=1e-9)
+    published = summary["published"]
+    assert published["log_likelihood_at_theta"] == pytest.approx(expected, rel=1e-6)
+    assert list(published["theta"].values()) == pytest.approx(list(EXPECTED["theta_published_si"].values()), rel=1e-9)
     # The pooled fit is the maximum of just these paths.
     assert summary["pooled"]["log_likelihood"] > expected
 
 
-@pytest.mark.skipif(RUNS != ["2316", "2346", "3930", "7180"], reason="the README tells of four participants")
+@pytest.mark.skipif(RUNS != ["2316", "2346", "3930", "7180"], reason="the README shows four participants")
 def test_the_pooled_fit_is_as_the_readme_has_it(summary):
     pooled = summary["pooled"]
     assert list(pooled["theta"].values()) == pytest.approx([-53.62, -0.9838, -4.952, 1.608], rel=1e-3)
@@ -140,10 +140,14 @@ def test_completion_times_are_the_published_ones(summary):
             assert summary["completion_s"][modality][run] == [float(text)]
 
 
+<<<<<<< HEAD
 def test_which_claims_hold_is_reported(summary, written):
+=======
+def test_verdicts_are_in_the_report(summary, written):
+>>>>>>> evaluation
     verdicts = {claim["claim"]: claim["verdict"] for claim in summary["claims"]}
     assert len(verdicts) == 6
-    assert verdicts["Obstacle avoidance begins to give way later than people wish."] == "holds"
+    assert verdicts["Obstacle avoidance leaves the nominal path later than people wish."] == "holds"
     text = (written[1] / "report.md").read_text()
     assert f"**{10 * len(RUNS)} of {10 * len(RUNS)} paths**" in text
     for claim, verdict in verdicts.items():

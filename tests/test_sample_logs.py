@@ -105,7 +105,7 @@ def test_the_fit_is_at_least_as_likely_as_any_truth(pairs, second_cycles, pooled
 
 def test_learnt_paths_keep_the_demonstrated_distance(second_cycles, pooled):
     result = compare(second_cycles, {"pooled": pooled.reward}, Precision(100), np.random.default_rng(0))
-    rows = {row.kind: row for row in result.groups}
+    rows = {row.path_type: row for row in result.groups}
     driven, learnt = rows[DRIVEN], rows[LEARNT]
     assert abs(learnt.mean["min_distance_m"] - driven.mean["min_distance_m"]) < driven.std["min_distance_m"]
 

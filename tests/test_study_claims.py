@@ -1,4 +1,4 @@
-"""What participants say of the paper's claims, on numbers whose answers are known."""
+"""Verdicts on the paper's claims, on numbers whose answers are known."""
 
 from types import SimpleNamespace
 
@@ -130,14 +130,14 @@ def test_replays_that_are_far_are_not_close():
     assert replays.differences[1].verdict is Verdict.FAILS
 
 
-def test_a_log_that_says_no_more_avoids_obstacles_by_itself():
+def test_autonomous_trials_without_a_set_count_as_obstacle_avoidance():
     rows = [
         row(one.participant, one.group.replace(AVOIDANCE, "autonomous"), onset=one.values[DRIVEN]["onset_m"])
         for one in study()
     ]
     claim = titled(claims_of(rows, []), "late avoidance")
-    assert "less autonomous" in claim.asked
-    assert claim.text.startswith("The robot by itself (autonomous) begins")
+    assert "- autonomous" in claim.question
+    assert claim.text.startswith("The robot by itself (autonomous) leaves")
 
 
 def test_claims_without_data_are_left_out():
@@ -156,7 +156,7 @@ def test_expected_paths_are_held_against_those_on_the_grid():
     claims = claims_of(rows, learnt)
     assert [claim.title for claim in claims] == ["goodness of fit"]
     # Length is a feature of the reward, and no evidence of its own.
-    assert [one.what for one in claims[0].differences] == ["min. distance", "area under path"]
+    assert [one.quantity for one in claims[0].differences] == ["min. distance", "area under path"]
     distance = claims[0].differences[0]
     assert distance.paired.mean == pytest.approx(0.02)
     # Each participant has two paths 0.2 m apart: 0.1 m about their mean, with one degree of freedom each.
@@ -169,7 +169,7 @@ def test_the_margin_is_the_scatter_within_participants_whatever_lies_between_the
     assert np.isnan(scatter_within(rows[::2], DRIVEN, "length_m"))
 
 
-def test_who_saw_nobody_takes_no_part():
+def test_trials_without_people_do_not_count():
     rows = [*study(), row("alone", FORCE, distance=float("nan"), area=99.0), row("alone", AVOIDANCE, area=0.0)]
     area = titled(claims_of(rows, []), "smallest area").differences[0]
     assert "alone" not in area.paired.differences

@@ -1,4 +1,4 @@
-"""``navirl study`` on the sample logs: what is written, and that all of it says the same."""
+"""``navirl study`` on the sample logs: what is written, and that all of it agrees."""
 
 import json
 import re
@@ -28,7 +28,7 @@ ANSWERS = "participant,question,modality,answer\n" + "".join(
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The folder of a study, and what the command said."""
+    """The folder of a study, and what the command printed."""
     folder = tmp_path_factory.mktemp("study")
     (folder / "answers.csv").write_text(ANSWERS)
     out = folder / "out"
@@ -62,11 +62,11 @@ def test_participants_are_fitted_cycle_by_cycle(summary, demos):
         first = fit(evidence_of([one for one in own if one.cycle == 1]), Reward.named({}))
         second = fit(evidence_of([one for one in own if one.cycle == 2]), first.reward)
         found = summary["participants"][name]
-        for fitted, told in ((first, found["first_cycle"]), (second, found)):
-            assert list(told["theta"].values()) == pytest.approx(fitted.reward.theta, rel=1e-4)
-            assert list(told["standard_errors"].values()) == pytest.approx(fitted.standard_errors, rel=1e-2)
-            assert told["log_likelihood"] == pytest.approx(fitted.log_likelihood, abs=1e-4)
-            assert told["status"] == fitted.status.value
+        for fitted, learnt in ((first, found["first_cycle"]), (second, found)):
+            assert list(learnt["theta"].values()) == pytest.approx(fitted.reward.theta, rel=1e-4)
+            assert list(learnt["standard_errors"].values()) == pytest.approx(fitted.standard_errors, rel=1e-2)
+            assert learnt["log_likelihood"] == pytest.approx(fitted.log_likelihood, abs=1e-4)
+            assert learnt["status"] == fitted.status.value
 
 
 def test_the_pooled_fit_is_that_of_all_second_cycles(summary, demos):
@@ -78,7 +78,7 @@ def test_the_pooled_fit_is_that_of_all_second_cycles(summary, demos):
 
 
 def test_metrics_by_condition_are_those_of_evaluate(summary, demos):
-    rows = {row.group: row for row in compare(demos, {}, Precision(), None).groups if row.kind == DRIVEN}
+    rows = {row.group: row for row in compare(demos, {}, Precision(), None).groups if row.path_type == DRIVEN}
     assert set(summary["metrics"]) == set(rows) == {"force, cycle 1", "force, cycle 2", "joystick", "autonomous"}
     for group, row in rows.items():
         driven = summary["metrics"][group]["driven"]
@@ -89,20 +89,31 @@ def test_metrics_by_condition_are_those_of_evaluate(summary, demos):
         assert driven["min_center_distance_m"]["mean"] == pytest.approx(row.mean["min_distance_m"] + 0.3, rel=1e-4)
 
 
-def test_the_report_tells_the_summarys_numbers(written, summary):
+def cells_of(text, first):
+    """The cells of a table's row by its first cell."""
+    (row,) = re.findall(rf"^\| {re.escape(first)} +\|(.*)\|$", text, re.MULTILINE)
+    return [cell.strip() for cell in row.split("|")]
+
+
+def test_the_report_holds_the_summarys_numbers(written, summary):
     out, result = written
     page, text = (out / "report.html").read_text(), (out / "report.md").read_text()
+    learnt = text[text.index("## Learnt rewards") :]
+    learnt = learnt[: learnt.index("## Learnt policies")]
     for name in ("p01", "p02", "p03"):
-        told = summary["participants"][name]
-        for parameter, value in told["theta"].items():
-            shown = f"{value:.4g} ± {told['standard_errors'][parameter]:.2g}"
-            assert shown in text
-            assert shown in page
-            assert shown in result.stdout
-        assert f"{told['log_likelihood']:.3f}" in text
-    for group in summary["metrics"].values():
-        area = group["driven"]["area_m2"]
-        assert f"{area['mean']:.3f} ± {area['standard_deviation']:.3f}" in text
+        found = summary["participants"][name]
+        cells = cells_of(learnt, f"{name}, cycle 2")
+        numbers = [[float(number) for number in cell.split(" ± ")] for cell in cells[1:5]]
+        for shown, (parameter, value) in zip(numbers, found["theta"].items(), strict=True):
+            expected = [one for one in (value, found["standard_errors"][parameter]) if one is not None]
+            assert shown == pytest.approx(expected, abs=0.01)
+        assert cells[5] == f"{found['log_likelihood']:.3f}"
+        assert cells[1].replace("-", "\N{MINUS SIGN}") in page
+        assert cells[1] in result.stdout
+    for group, row in summary["metrics"].items():
+        area = row["driven"]["area_m2"]
+        shown = cells_of(text[text.index("## Path properties") :].split("\n\n- ")[0], group)
+        assert shown[4] == f"{area['mean']:.3f} ± {area['standard_deviation']:.3f}"
     assert len(summary["claims"]) == 5
     for claim in summary["claims"]:
         assert claim["claim"] in text
@@ -136,8 +147,8 @@ def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
     for path in out.rglob("*"):
         if path.is_file():
             assert (tmp_path / "out" / path.relative_to(out)).read_bytes() == path.read_bytes(), path
-    told, summary = json.loads(result.stdout), json.loads((out / "summary.json").read_text())
-    assert told == {key: value for key, value in summary.items() if key not in {"format", "version", "navirl"}}
+    printed, summary = json.loads(result.stdout), json.loads((out / "summary.json").read_text())
+    assert printed == {key: value for key, value in summary.items() if key not in {"format", "version", "navirl"}}
 
 
 def test_demonstrations_can_stand_in_for_logs(navirl, written, summary, tmp_path):
@@ -157,11 +168,11 @@ def test_answers_stand_in_numbers_too(written, summary):
     assert len(summary["answers"]) == 2
     for one in summary["answers"]:
         assert (one["n"], sum(one["counts"])) == (6, 6)
-        assert re.search(rf"\| {one['modality']} +\| +6 +\| +{one['median']:g} ", text)
+        assert re.search(rf"\| {one['modality']} +\| +6 +\| +{one['median']:.1f} ", text)
     assert "participants without a log: p04, p05, p06" in written[1].stderr
 
 
-def test_nothing_is_replaced_unasked(navirl, written):
+def test_existing_files_are_kept_without_force(navirl, written):
     out, _ = written
     result = navirl("study", *LOGS, "-o", out, code=1)
     assert "exists already; choose another name, or replace it with --force" in result.stderr
@@ -171,13 +182,13 @@ def test_logs_without_cycles_are_refused(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(wrench_topics=()))
     result = navirl("study", log, "-o", "out", code=1)
     assert (
-        "navirl: a study needs trials of the condition force in cycle 2 and without a set, found none of"
+        "navirl: a study needs trials of the condition force in cycle 2 and without a set, found no trial of"
         in result.stderr
     )
     assert not (tmp_path / "out" / "summary.json").exists()
 
 
-def test_a_bad_questionnaire_is_told_before_the_work(navirl, tmp_path):
+def test_a_bad_questionnaire_is_refused_before_the_work(navirl, tmp_path):
     (tmp_path / "answers.csv").write_text("who,what\nann,yes\n")
     result = navirl("study", *LOGS, "-o", "out", "--questionnaire", "answers.csv", code=1)
     assert "answers.csv" in result.stderr

@@ -69,9 +69,9 @@ def test_the_second_cycle_starts_where_the_first_ended():
     assert everyone.second.fit.initial == Reward.named({})
 
 
-def test_a_missing_cycle_is_no_trouble():
+def test_a_missing_cycle_is_no_problem():
     ann, bob, _ = (learn(job) for job in jobs_of([*FIRSTS["ann"], *SECONDS["bob"]], 50, 0))
-    assert (ann.second, ann.first.near, ann.trouble) == (None, None, ())
+    assert (ann.second, ann.first.near, ann.problems) == (None, None, ())
     assert bob.first is None
     assert bob.second.fit.initial == Reward.named({})
 
@@ -81,8 +81,8 @@ def test_what_cannot_be_fitted_is_told_and_the_rest_stands():
     ann = learn(jobs_of([through, *SECONDS["ann"]], 50, 0)[0])
     assert ann.first is None
     assert ann.second is not None
-    assert len(ann.trouble) == 1
-    assert ann.trouble[0].startswith("ann, cycle 1: demonstration ann/10: its path passes the goal's cell")
+    assert len(ann.problems) == 1
+    assert ann.problems[0].startswith("ann, cycle 1: demonstration ann/10: its path passes the goal's cell")
 
 
 def test_a_fit_stands_though_its_paths_cannot_be_compared(monkeypatch):
@@ -93,7 +93,7 @@ def test_a_fit_stands_though_its_paths_cannot_be_compared(monkeypatch):
     ann = learn(jobs_of(ALL, 50, 0)[0])
     assert ann.first.near is None
     assert ann.second.fit.initial == ann.first.fit.reward
-    assert ann.trouble == ("ann, cycle 1: no policy in this scene", "ann, cycle 2: no policy in this scene")
+    assert ann.problems == ("ann, cycle 1: no policy in this scene", "ann, cycle 2: no policy in this scene")
 
 
 def test_published_parameters_are_compared_with_published_paths_only():
@@ -119,10 +119,10 @@ def test_what_a_reader_should_know():
     lines = remarks([*ALL, other, unsaid, aside], [Answer("ann", "q", "", 1), Answer("zoe", "q", "", 1)])
     assert [line.split(":")[0] for line in lines] == [
         "trials are on 2 maps",
-        "robots of radii 0.25, 0.4 m are put together",
+        "robots of radii 0.25, 0.4 m are combined",
         "cycle 3",
-        "1 trials of the condition force say neither cycle nor set",
-        "trials of the condition force in the sets slalom are not fitted, though they say a cycle",
+        "1 trials of the condition force have neither cycle nor set",
+        "trials of the condition force in the sets slalom are not fitted, although they have a cycle",
         "the questionnaire holds answers of participants without a log",
     ]
     assert lines[-1].endswith(" zoe")
@@ -131,7 +131,7 @@ def test_what_a_reader_should_know():
 def test_expected_properties_are_those_of_many_paths():
     near = closeness(TRUTH, SECONDS["ann"], 4000, np.random.default_rng(0))
     result = compare(SECONDS["ann"], {"t": TRUTH}, Precision(4000), np.random.default_rng(1))
-    rows = {row.kind: row for row in result.groups}
+    rows = {row.path_type: row for row in result.groups}
     for name in ("length_m", "min_distance_m", "area_m2"):
         assert near.demonstrated.mean[name] == rows[ON_GRID].mean[name]
         assert near.demonstrated.std[name] == rows[ON_GRID].std[name]
@@ -175,13 +175,13 @@ def test_progress_names_whose_fit_is_done():
 
 
 def test_a_study_needs_second_cycles():
-    with pytest.raises(DemonstrationError, match=r"found 2 trials of it \(cycle 1, no set\); say which trial is what"):
+    with pytest.raises(DemonstrationError, match=r"found 2 trials of it \(cycle 1, no set\); describe the trials"):
         study_of(FIRSTS["ann"], {}, 10, 0)
     with pytest.raises(DemonstrationError, match=r"found 8 trials of it \(no cycle, no set\)"):
         study_of([replace(one, cycle=None) for one in ALL], {}, 10, 0)
     with pytest.raises(DemonstrationError, match=r"found 8 trials of it \(cycle 1, main; cycle 2, main\)"):
         study_of([replace(one, set="main") for one in ALL], {}, 10, 0)
-    with pytest.raises(DemonstrationError, match=r"found none of that condition"):
+    with pytest.raises(DemonstrationError, match=r"found no trial of that condition"):
         study_of([replace(one, condition=Condition.JOYSTICK) for one in ALL], {}, 10, 0)
 
 

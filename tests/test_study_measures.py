@@ -54,7 +54,7 @@ def test_groups_leave_trials_without_people_out():
     rows = rows_of(trials)
     assert [row.group for row in rows][2] == "force, obstacle course"
     groups = groups_of(trials, rows)
-    assert [(one.group, one.kind) for one in groups] == [
+    assert [(one.group, one.path_type) for one in groups] == [
         (group, kind) for group in ("force, cycle 2", "joystick", "obstacle avoidance") for kind in (DRIVEN, ON_GRID)
     ]
     force = groups[0]

@@ -31,7 +31,7 @@ def metrics_document(
     Args:
         result: Metrics by group.
         pairs: Comparisons of groups.
-        ranks: Of demonstrations; none where they were not asked for.
+        ranks: Of demonstrations; empty if they were not asked for.
         metrics: That were asked for.
         inputs: The files that it was made from.
         precision: How many paths were drawn.
@@ -71,7 +71,7 @@ def _group(row: GroupMetrics, names: Sequence[str]) -> dict[str, Any]:
     measured = {"participants": row.participants, "half_interval": _chosen(row.half_interval, names)}
     return {
         "group": row.group,
-        "path_type": row.kind,
+        "path_type": row.path_type,
         "count": row.count,
         "mean": _chosen(row.mean, names),
         "standard_deviation": _chosen(row.std, names),

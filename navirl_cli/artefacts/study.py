@@ -6,7 +6,7 @@ from typing import Any
 from navirl_cli.artefacts.store import number
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Values
+from navirl_cli.evaluation.metrics import Values
 from navirl_cli.irl.fit import Fit
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt
@@ -19,8 +19,8 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
 
     Args:
         study: The study.
-        cells: Published paths, and whether our cells are the same; empty where none were published.
-        answers: To the questionnaire; none where there is none.
+        cells: Published paths, and whether our cells are the same; empty without published paths.
+        answers: To the questionnaire; empty without one.
     """
     return {
         "participants": {one.participant: _learnt(one) for one in study.participants},
@@ -45,29 +45,30 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
         "demonstrations": [
             {
                 "id": row.id,
+                "participant": row.participant,
                 "group": row.group,
-                "metrics": _metrics(row.values[DRIVEN])
-                | {"min_center_distance_m": number(row.values[DRIVEN]["min_center_distance_m"])},
-                "metrics_on_grid": _metrics(row.values[ON_GRID]),
-                "onset_m": number(row.values[DRIVEN]["onset_m"]),
+                "metrics": _numbers(row.values[DRIVEN]),
+                "metrics_on_grid": _numbers(row.values[ON_GRID]),
+                "missing": dict(row.missing[DRIVEN]),
+                "missing_on_grid": dict(row.missing[ON_GRID]),
             }
             for row in study.rows
         ],
     }
 
 
-def _metrics(values: Values) -> dict[str, float | None]:
-    """The paper's three."""
-    return {metric.name: number(values[metric.name]) for metric in PAPER_METRICS}
+def _numbers(values: Values) -> dict[str, float | None]:
+    """Values by metric; null where one does not exist."""
+    return {name: number(value) for name, value in values.items()}
 
 
 def _learnt(learnt: Learnt) -> dict[str, Any]:
     """The reward after the second cycle, and after the first."""
-    return {**_cycle(learnt.second), "first_cycle": _cycle(learnt.first), "trouble": list(learnt.trouble)}
+    return {**_cycle(learnt.second), "first_cycle": _cycle(learnt.first), "problems": list(learnt.problems)}
 
 
 def _cycle(found: CycleFit | None) -> dict[str, Any]:
-    """One cycle's fit and how near its paths come to the second cycle's; nulls where there is none."""
+    """One cycle's fit and how near its paths come to the second cycle's; nulls if the cycle is missing."""
     if found is None:
         return dict.fromkeys(
             (
@@ -106,13 +107,12 @@ def _by_name(names: Iterable[str], values: Iterable[float]) -> dict[str, float |
 def _closeness(near: Closeness) -> dict[str, Any]:
     """Properties expected under the policy beside the demonstrated ones, on the grid."""
     shown, learnt = near.demonstrated, near.learnt
-    names = [metric.name for metric in PAPER_METRICS]
     return {
-        "demonstrated": _metrics(shown.mean),
-        "demonstrated_standard_deviation": _metrics(shown.std),
-        "expected": {name: number(learnt.expected(name)) for name in names},
-        "standard_deviation": _metrics(learnt.std),
-        "monte_carlo_error": {name: number(learnt.monte_carlo_error(name)) for name in names},
+        "demonstrated": _numbers(shown.mean),
+        "demonstrated_standard_deviation": _numbers(shown.std),
+        "expected": _numbers({name: learnt.expected(name) for name in learnt.mean}),
+        "standard_deviation": _numbers(learnt.std),
+        "monte_carlo_error": _numbers({name: learnt.monte_carlo_error(name) for name in learnt.mean}),
     }
 
 
@@ -120,8 +120,10 @@ def _properties(rows: Iterable[GroupMetrics]) -> dict[str, Any]:
     """Mean and standard deviation of each property over the paths of each group."""
     found: dict[str, dict[str, Any]] = {}
     for row in rows:
-        group = found.setdefault(row.group, {"paths": row.count, "participants": row.participants})
-        group["driven" if row.kind == DRIVEN else "on_grid"] = {
+        group = found.setdefault(row.group, {"count": row.count, "participants": row.participants})
+        suffix = "" if row.path_type == DRIVEN else "_on_grid"
+        group[f"missing{suffix}"] = {name: dict(reasons) for name, reasons in row.missing.items()}
+        group["driven" if row.path_type == DRIVEN else "on_grid"] = {
             name: {"mean": number(mean), "standard_deviation": number(row.std[name])} for name, mean in row.mean.items()
         }
     return found
@@ -130,18 +132,19 @@ def _properties(rows: Iterable[GroupMetrics]) -> dict[str, Any]:
 def _claim(claim: Claim) -> dict[str, Any]:
     return {
         "claim": claim.text,
-        "asked": claim.asked,
+        "question": claim.question,
         "verdict": claim.verdict.value,
         "differences": [
             {
-                "of": one.what,
+                "quantity": one.quantity,
                 "unit": one.unit,
                 "mean": one.paired.mean,
-                "lower": number(one.paired.student.lower),
-                "upper": number(one.paired.student.upper),
+                "n": one.paired.n,
+                "student_lower": number(one.paired.student.lower),
+                "student_upper": number(one.paired.student.upper),
                 "by_participant": dict(one.paired.differences),
                 "margin": None if one.margin is None else number(one.margin),
-                "against": one.against,
+                "participants_against": one.against,
                 "verdict": one.verdict.value,
             }
             for one in claim.differences

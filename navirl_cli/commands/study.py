@@ -32,12 +32,12 @@ from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
-from navirl_cli.documents.tables import written
+from navirl_cli.documents.text import to_text
 from navirl_cli.files import Input, check_writable, new_folder, replacing
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
-    from navirl_cli.reports.study import Told
+    from navirl_cli.reports.study import StudyContext
     from navirl_cli.study.pipeline import Study
 
 REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demos.json"
@@ -89,7 +89,7 @@ def study(
     """
     from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study
-    from navirl_cli.reports.study import FIGURES, Told, remarks
+    from navirl_cli.reports.study import FIGURES, StudyContext, overview_of, remarks
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
@@ -115,15 +115,15 @@ def study(
         pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
             drawn = draw_study(found, pooled, bars, figures, force=force, progress=update)
-        trouble = [line for one in (*found.participants, found.pooled) for line in one.trouble]
-        lost = [*given.lost, *trouble, *pooled.notes]
+        problems = [line for one in (*found.participants, found.pooled) for line in one.problems]
+        lost = [*given.lost, *problems, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]
-        told = Told(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
-        _write_report(output, found, told, force=force)
+        context = StudyContext(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
+        _write_report(output, found, context, force=force)
     if as_json:
         echo_json(document)
     else:
-        echo(_overview(found, told))
+        echo(to_text(overview_of(found, context)))
     for line in notes:
         say(line)
     finish(lost)
@@ -192,24 +192,13 @@ def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[floa
     return times
 
 
-def _write_report(output: Path, study: "Study", told: "Told", *, force: bool) -> None:
+def _write_report(output: Path, study: "Study", context: "StudyContext", *, force: bool) -> None:
     """The report as Markdown and as one page."""
     from navirl_cli.documents.markdown import to_markdown
     from navirl_cli.documents.page import to_html
     from navirl_cli.reports.study import report_of
 
-    report = report_of(study, told)
+    report = report_of(study, context)
     for name, text in ((REPORT, to_markdown(report, output)), (PAGE, to_html(report))):
         with replacing(output / name, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
-
-
-def _overview(study: "Study", told: "Told") -> str:
-    """The learnt rewards and the verdicts, as text."""
-    from navirl_cli.reports.study import claims_lines
-    from navirl_cli.reports.study_tables import rewards_table
-
-    lines = [written(rewards_table(study)), "", *claims_lines(study.claims)]
-    if told.cells:
-        lines += ["", f"cells as published: {sum(same for _, same in told.cells)} of {len(told.cells)} paths"]
-    return "\n".join(lines)

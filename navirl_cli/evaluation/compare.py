@@ -21,7 +21,7 @@ PERSON_RADIUS_M = 0.25
 
 DRIVEN, ON_GRID, LEARNT, NOMINAL, AVOIDANCE = "driven", "driven, on grid", "learnt", "nominal", "avoidance"
 #: The types of paths, in the order of the tables; several rewards have "learnt, NAME" each.
-KINDS: dict[str, str] = {
+PATH_TYPES: dict[str, str] = {
     DRIVEN: "the demonstrated poses",
     ON_GRID: "the demonstrated path through the centres of its cells, comparable with learnt paths",
     LEARNT: "paths drawn from the learnt policy, through the centres of cells",
@@ -86,20 +86,21 @@ def compare(
     groups: list[GroupMetrics] = []
     for group in by_group(demonstrations, fields):
         own = [number for number, row in enumerate(rows) if row.group == group]
-        kinds = dict.fromkeys(kind for number in own for kind in rows[number].values)
-        found = {kind: summary_of(group, kind, [rows[number] for number in own]) for kind in kinds}
+        path_types = dict.fromkeys(path_type for number in own for path_type in rows[number].values)
+        found = {path_type: summary_of(group, path_type, [rows[number] for number in own]) for path_type in path_types}
         for name in rewards:
             members = [(drawn[name, where[number]], where[number].numbers.index(number)) for number in own]
-            kind = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
-            found[kind] = expected_of(group, kind, members, metrics)
-        groups += [found[kind] for kind in sorted(found, key=lambda kind: (_place(kind), kind)) if found[kind].mean]
+            path_type = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
+            found[path_type] = expected_of(group, path_type, members, metrics)
+        ordered = sorted(found.values(), key=lambda row: (_place(row.path_type), row.path_type))
+        groups += [row for row in ordered if row.mean]
     missing = {metric.name: NO_REWARD for metric in metrics if metric.near is not None and not rewards}
     return Comparison(tuple(groups), tuple(rows), tuple(notes), missing)
 
 
-def _place(kind: str) -> int:
+def _place(path_type: str) -> int:
     """A type's place in the tables."""
-    return list(KINDS).index(kind if kind in KINDS else LEARNT)
+    return list(PATH_TYPES).index(path_type if path_type in PATH_TYPES else LEARNT)
 
 
 def _shown(
@@ -147,16 +148,18 @@ def measured(
     """
     lacking, one = missing_of(demonstration), demonstration
     found = {
-        kind: measure(
+        path_type: measure(
             metrics,
             Lines(line[None], nominal_m, one.people_m, one.robot_radius_m),
             lacking,
-            Drive(one) if kind == DRIVEN else None,
+            Drive(one) if path_type == DRIVEN else None,
         )
-        for kind, line in lines.items()
+        for path_type, line in lines.items()
     }
-    values = {kind: values for kind, (values, _) in found.items()}
-    return Measured(one.id, one.participant, group, values, {kind: reasons for kind, (_, reasons) in found.items()})
+    values = {path_type: values for path_type, (values, _) in found.items()}
+    return Measured(
+        one.id, one.participant, group, values, {path_type: reasons for path_type, (_, reasons) in found.items()}
+    )
 
 
 def _lines_of(
@@ -185,7 +188,7 @@ def _lines_of(
 
 
 def _avoidance(scene: Scene, clearance_m: float) -> FloatArray | SceneError:
-    """The path around people, or why there is none."""
+    """The path around people, or why it does not exist."""
     try:
         return avoidance_line_m(scene, clearance_m)
     except SceneError as error:

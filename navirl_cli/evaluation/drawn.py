@@ -116,12 +116,14 @@ def _needed(values: Sequence[FloatArray], error: float) -> int:
     return min(needed, MOST)
 
 
-def expected_of(group: str, kind: str, members: Sequence[tuple[Drawn, int]], metrics: Sequence[Metric]) -> GroupMetrics:
+def expected_of(
+    group: str, path_type: str, members: Sequence[tuple[Drawn, int]], metrics: Sequence[Metric]
+) -> GroupMetrics:
     """Expected values over the scenes of a group, each as often as it was demonstrated in.
 
     Args:
         group: Its name.
-        kind: Its type of path.
+        path_type: Its type of path.
         members: For each demonstration its learnt paths, and its place among the demonstrations that share them.
         metrics: That were asked for.
     """
@@ -131,7 +133,7 @@ def expected_of(group: str, kind: str, members: Sequence[tuple[Drawn, int]], met
     found = {metric.name: _expected(metric, scenes) for metric in metrics if metric.drive is None}
     return GroupMetrics(
         group,
-        kind,
+        path_type,
         len(members),
         mean={name: one.mean for name, one in found.items()},
         std={name: one.std for name, one in found.items()},
@@ -159,7 +161,7 @@ def _expected(metric: Metric, scenes: Mapping[Drawn, Sequence[int]]) -> _Expecte
     missing: dict[str, int] = {}
     for drawn, places in scenes.items():
         own = drawn.values.get(metric.name, np.empty((1, 0)))
-        # Demonstrations of one scene share its paths, so that they share the error too.
+        # Demonstrations of one scene share its paths, and therefore the error.
         own = own[list(places)] if metric.near is not None else own
         known = own[:, np.isfinite(own).all(axis=0)]
         if known.size == 0:

@@ -23,10 +23,10 @@ FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class GroupMetrics(ByContent):
-    """Mean and spread of the paths of one kind in one group of demonstrations."""
+    """Mean and spread of the paths of one path_type in one group of demonstrations."""
 
     group: str
-    kind: str
+    path_type: str
     #: Number of demonstrations.
     count: int
     mean: Values
@@ -49,7 +49,7 @@ class GroupMetrics(ByContent):
         return self.count - sum(self.missing.get(name, {}).values())
 
     def expected(self, name: str) -> float:
-        """Mean of a metric, the exact one where there is one; NaN where there is none."""
+        """Mean of a metric, exact where visits give it; NaN where it does not exist."""
         return self.exact.get(name, self.mean.get(name, float("nan")))
 
     def monte_carlo_error(self, name: str) -> float:
@@ -95,9 +95,9 @@ def groups_named(demonstrations: Iterable[Demonstration], names: Iterable[str]) 
 
 
 def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
-    """The group of a demonstration: its condition, its cycle and its set where known, or what fields of FIELDS say.
+    """The group of a demonstration: condition, cycle and set where they are known, or the given names of FIELDS.
 
-    A robot that drives by itself is what its set says: "obstacle avoidance".
+    Trials of a robot that drives by itself have the name of their set: "obstacle avoidance".
     """
     if fields:
         return ", ".join(of(demonstration) for name, of in FIELDS.items() if name in fields)
@@ -107,45 +107,47 @@ def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
     return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
 
 
-def summary_of(group: str, kind: str, rows: Iterable[Measured]) -> GroupMetrics:
+def summary_of(group: str, path_type: str, rows: Iterable[Measured]) -> GroupMetrics:
     """Mean, standard deviation and interval over a group's paths of one type, those with a value each.
 
     Args:
         group: Its name.
-        kind: The type of path.
+        path_type: The type of path.
         rows: What was measured of the group; demonstrations without this type of path do not count.
     """
-    paths = [row for row in rows if kind in row.values]
+    paths = [row for row in rows if path_type in row.values]
     mean, std, half = {}, {}, {}
     missing: dict[str, dict[str, int]] = {}
-    for name in dict.fromkeys(name for row in paths for name in row.values[kind]):
-        mean[name], std[name] = mean_and_spread(row.values[kind][name] for row in paths)
-        half[name] = student_half_width(by_participant(paths, kind, name).values())
-        for reason in (row.missing[kind][name] for row in paths if name in row.missing.get(kind, {})):
+    for name in dict.fromkeys(name for row in paths for name in row.values[path_type]):
+        mean[name], std[name] = mean_and_spread(row.values[path_type][name] for row in paths)
+        half[name] = student_half_width(by_participant(paths, path_type, name).values())
+        for reason in (row.missing[path_type][name] for row in paths if name in row.missing.get(path_type, {})):
             own = missing.setdefault(name, {})
             own[reason] = own.get(reason, 0) + 1
     people = len({row.participant for row in paths})
-    return GroupMetrics(group, kind, len(paths), mean, std, half_interval=half, participants=people, missing=missing)
+    return GroupMetrics(
+        group, path_type, len(paths), mean, std, half_interval=half, participants=people, missing=missing
+    )
 
 
-def by_participant(rows: Iterable[Measured], kind: str, name: str) -> dict[str, float]:
+def by_participant(rows: Iterable[Measured], path_type: str, name: str) -> dict[str, float]:
     """Mean of a metric over each participant's finite values; participants without one are left out.
 
     Args:
         rows: What was measured.
-        kind: The type of path.
+        path_type: The type of path.
         name: The metric.
     """
     values: dict[str, list[float]] = {}
     for row in rows:
-        value = row.values.get(kind, {}).get(name, np.nan)
+        value = row.values.get(path_type, {}).get(name, np.nan)
         if np.isfinite(value):
             values.setdefault(row.participant, []).append(value)
     return {participant: float(np.mean(own)) for participant, own in values.items()}
 
 
 def mean_and_spread(values: Iterable[float]) -> tuple[float, float]:
-    """Mean and sample standard deviation (n - 1) of the finite values; NaN for none, and for one."""
+    """Mean and sample standard deviation (n - 1) of the finite values; NaN where there are too few."""
     known = np.array([value for value in values if np.isfinite(value)])
     mean = float(known.mean()) if len(known) else float("nan")
     return mean, float(known.std(ddof=1)) if len(known) > 1 else float("nan")

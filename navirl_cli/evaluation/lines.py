@@ -15,6 +15,8 @@ from navirl_cli.evaluation.segments import ZONES, Segments
 PIECE_M, APART_M = 0.1, 0.0999
 #: A path has left the nominal path where it is farther from it than this, m: a cell and a half.
 LEAVES_M = 0.15
+#: Coordinates of maps differ by less than this through rounding, m.
+ROUNDING_M = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +132,45 @@ def areas_m2(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
         lines_m: (m, n, 2) m; a line may rest at its end.
         nominal_m: (k, 2) m.
     """
+    areas = _areas_along(lines_m, nominal_m)
+    if (turning := np.isnan(areas)).any():
+        areas[turning] = _areas_of_faces(lines_m[turning], nominal_m)
+    return areas
+
+
+def _areas_along(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
+    """(m,) areas beside a straight nominal path, as integrals of the distance from it.
+
+    NaN for lines that somewhere move backwards along it, and for a nominal path with corners. Four of five paths of a
+    policy in a hallway never move backwards, and cutting the plane into faces takes ten times as long.
+    """
+    ahead = nominal_m[-1] - nominal_m[0]
+    length = float(np.hypot(*ahead))
+    ahead = ahead / max(length, ROUNDING_M)
+    if length == 0 or (np.abs(_beside(nominal_m, nominal_m[0], ahead)) > ROUNDING_M).any():
+        return np.full(len(lines_m), np.nan)
+    ends = ((0, 0), (1, 1))
+    along = np.pad((lines_m - nominal_m[0]) @ ahead, ends)
+    along[:, -1] = length
+    steps = np.diff(along, axis=1)
+    beside = np.abs(aside := np.pad(_beside(lines_m, nominal_m[0], ahead), ends))
+    summed = beside[:, 1:] + beside[:, :-1]
+    crossing = aside[:, 1:] * aside[:, :-1] < 0
+    # Where a segment crosses the nominal path, two triangles are left of the trapezium.
+    height = np.where(crossing, (beside[:, 1:] ** 2 + beside[:, :-1] ** 2) / np.where(crossing, summed, 1.0), summed)
+    areas: FloatArray = np.where((steps > -ROUNDING_M).all(axis=1), (height * steps).sum(axis=1) / 2, np.nan)
+    return areas
+
+
+def _beside(points_m: FloatArray, start_m: FloatArray, ahead: FloatArray) -> FloatArray:
+    """(...) signed distances of (..., 2) points from the straight line through a point, m."""
+    away = points_m - start_m
+    beside: FloatArray = ahead[0] * away[..., 1] - ahead[1] * away[..., 0]
+    return beside
+
+
+def _areas_of_faces(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
+    """(m,) areas of the bounded faces between lines and a nominal path."""
     import shapely
 
     back = np.broadcast_to(nominal_m[::-1], (len(lines_m), *nominal_m.shape))

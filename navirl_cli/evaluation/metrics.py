@@ -71,7 +71,7 @@ class Metric:
     needs: tuple[Need, ...] = ()
     #: (m,) values of the paths of any type: driven, on the grid, learnt, nominal, avoidance.
     lines: Callable[[Lines], FloatArray] | None = None
-    #: Value of a demonstration as it was driven, for what a line does not tell.
+    #: Value of a demonstration as it was driven, for what a line does not contain.
     drive: Callable[[Drive], float] | None = None
     #: (m,) values of learnt paths beside a demonstrated one.
     near: Callable[[Nearness], FloatArray] | None = None
@@ -81,7 +81,7 @@ class Metric:
     undefined: str = "not defined for this path"
 
     def __post_init__(self) -> None:
-        """Check that it is computed in one way."""
+        """Check that there is one function."""
         if sum(function is not None for function in (self.lines, self.drive, self.near)) != 1:
             raise ValueError(f"metric {self.name}: needs exactly one of lines, drive and near")
 

@@ -63,7 +63,7 @@ class Paired(ByContent):
 
     @cached_property
     def wilcoxon_p(self) -> float:
-        """Two-sided p-value of Wilcoxon's signed-rank test without the pairs that do not differ; NaN for none.
+        """Two-sided p-value of Wilcoxon's signed-rank test of the pairs that differ; NaN if none differs.
 
         Exact for up to 50 pairs without ties.
         """
@@ -94,7 +94,7 @@ def paired(one: Mapping[str, float], other: Mapping[str, float], rng: np.random.
     Args:
         one: A value by participant.
         other: The same in the other group.
-        rng: Source of randomness of the bootstrap; without it there is none.
+        rng: Source of randomness of the bootstrap; None to leave the bootstrap out.
 
     Returns:
         one minus other; participants without a finite value in both do not count.

@@ -127,7 +127,7 @@ class Visits:
     @property
     def heading_rad(self) -> float:
         """Expected sum of the absolute changes of direction, rad."""
-        # The next move is drawn in the state where this one ends; none is in the goal.
+        # The next move is drawn in the state where this one ends; the goal has no next move.
         turns = self.policy.probability @ TURN_RAD
         after = np.where(self._flow > 0, self.steps.lattice.neighbours, 0)
         turned = np.take_along_axis(turns[after], np.arange(8)[None, :, None], 2)[..., 0]

@@ -1,9 +1,9 @@
-"""How well a learnt policy explains each path: where its log-likelihood ranks among those of the policy's own paths.
+"""How well a learnt policy explains each path: the rank of its log-likelihood among those of the policy's own paths.
 
 If demonstrations came from the policy, ranks would be uniform between 0 and 1 (A. P. Dawid, Statistical theory: the
 prequential approach, Journal of the Royal Statistical Society A 147 (1984); S. Talts et al., Validating Bayesian
-inference algorithms with simulation-based calibration, 2018). Ranks near 0 are of paths that the policy hardly takes;
-ranks crowded at 1 of paths that are more typical than paths are.
+inference algorithms with simulation-based calibration, 2018). Paths that the policy hardly takes have ranks near 0.
+Many ranks near 1 belong to demonstrations that are more typical than the policy's own paths.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,13 +24,13 @@ from navirl_cli.irl.values import Policy
 
 @dataclass(frozen=True)
 class Rank:
-    """Where one demonstration ranks."""
+    """The rank of one demonstration."""
 
     id: str
     group: str
     #: Of the demonstrated path under the policy, nats.
     log_likelihood: float
-    #: Share of the policy's paths that are less likely, in [0, 1]; equal ones are shared out by chance.
+    #: Share of the policy's paths that are less likely, in [0, 1]; ties are broken at random.
     rank: float
 
 
@@ -44,14 +44,14 @@ def ranks_of(
     """Rank demonstrations among paths drawn from a policy in their scenes.
 
     Args:
-        demonstrations: Best such as the reward was not learnt from.
+        demonstrations: Preferably such as the reward was not learnt from.
         reward: What was learnt.
         samples: Paths to draw in each scene.
         rng: Source of randomness.
         progress: Called with demonstrations done and in all.
 
     Raises:
-        SceneError: A demonstration's scene has no way.
+        SceneError: A demonstration's scene has no path from start to goal.
         InfinitePartitionError: The reward has no policy in a scene.
     """
     drawn: dict[Scene, tuple[Policy, FloatArray]] = {}

@@ -71,10 +71,10 @@ def bars_of(rows: Iterable[GroupMetrics], learnt_from: Container[str] | None = N
     """
     bars = []
     for row in rows:
-        if row.kind == DRIVEN:
+        if row.path_type == DRIVEN:
             bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
-        elif row.kind in {ON_GRID, LEARNT} and (learnt_from is None or row.group in learnt_from):
-            name, key = ("learnt", LEARNT) if row.kind == LEARNT else ("on grid", row.group)
+        elif row.path_type in {ON_GRID, LEARNT} and (learnt_from is None or row.group in learnt_from):
+            name, key = ("learnt", LEARNT) if row.path_type == LEARNT else ("on grid", row.group)
             bars.append(PropertyBar(f"{row.group}, {name}", key, row.mean, row.std, row.count))
     return bars
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from navirl_cli.artefacts.metrics import Pairs
 from navirl_cli.documents.tables import Cell, Column, Format, Interval, Spread, Table, written
-from navirl_cli.evaluation.compare import DRIVEN, KINDS, LEARNT, Comparison
+from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, Metric
+from navirl_cli.evaluation.metrics import METRICS, Metric
 from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
 
@@ -49,18 +49,18 @@ def evaluation_text(
         *([_ranks(ranks)] if ranks else []),
     ]
     parts = [written(table, how) for table in tables if table is not None]
-    left_out = _gathered((reason, BY_NAME[name].label) for name, reason in result.missing.items())
+    left_out = _gathered((result.missing[m.name], m.label) for m in metrics if m.name in result.missing)
     missing = "\n".join(f"Left out: {', '.join(labels)}: {reason}." for reason, labels in left_out.items())
     legend = "\n".join(_legend(result, metrics)) if how is Format.TEXT else ""
     return "\n\n".join(filter(None, [*parts, missing, legend]))
 
 
-def group_table(result: Comparison, metrics: Sequence[Metric], caption: str = "") -> Table:
+def group_table(groups: Sequence[GroupMetrics], metrics: Sequence[Metric], caption: str = "") -> Table:
     """Mean and standard deviation by group and type of path.
 
     Args:
-        result: Metrics by group.
-        metrics: The columns; rows of paths that have none of them are left out.
+        groups: The rows.
+        metrics: The columns; rows without any of them are left out.
         caption: Stands above.
     """
     columns = [
@@ -70,11 +70,11 @@ def group_table(result: Comparison, metrics: Sequence[Metric], caption: str = ""
         *(Column(metric.name, metric.heading, DECIMALS) for metric in metrics),
     ]
     rows: list[tuple[Cell, ...]] = [
-        (row.group, row.kind, row.count, *(_cell(row, metric) for metric in metrics))
-        for row in result.groups
+        (row.group, row.path_type, row.count, *(_cell(row, metric) for metric in metrics))
+        for row in groups
         if any(metric.name in row.mean for metric in metrics)
     ]
-    return Table(tuple(columns), tuple(rows), caption, _missing_note(result.groups, metrics))
+    return Table(tuple(columns), tuple(rows), caption, _missing_note(groups, metrics))
 
 
 def _missing_note(rows: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> str:
@@ -98,10 +98,12 @@ def _missing_note(rows: Sequence[GroupMetrics], metrics: Sequence[Metric]) -> st
 def _missing_in(rows: Sequence[GroupMetrics], name: str) -> Iterable[tuple[str, str]]:
     """Reasons for which a group lacks values of a metric, and where: the group, types of paths unless it is all."""
     having = [row for row in rows if name in row.mean]
-    kinds = _gathered(
-        ((reason, count, row.count), row.kind) for row in having for reason, count in row.missing.get(name, {}).items()
+    path_types = _gathered(
+        ((reason, count, row.count), row.path_type)
+        for row in having
+        for reason, count in row.missing.get(name, {}).items()
     )
-    for (reason, count, of), own in kinds.items():
+    for (reason, count, of), own in path_types.items():
         types = "" if len(own) == len(having) else f", {', '.join(own)}"
         yield reason, f"{rows[0].group}{types}" + ("" if count == of else f": {count} of {of}")
 
@@ -120,7 +122,7 @@ def _gathered(items: Iterable[tuple[Key, str]]) -> dict[Key, list[str]]:
 def _side_by_side(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
     """A table of the metrics of all paths, and one each of those of driven and of learnt paths only."""
     parts = [[metric for metric in metrics if metric.paths == paths] for paths in ("all", "driven", "learnt")]
-    return [table for part in parts if part and (table := group_table(result, part)).rows]
+    return [table for part in parts if part and (table := group_table(result.groups, part)).rows]
 
 
 def _below_each_other(result: Comparison, metrics: Sequence[Metric]) -> list[Table]:
@@ -132,7 +134,7 @@ def _below_each_other(result: Comparison, metrics: Sequence[Metric]) -> list[Tab
             part = [metric for metric in metrics if metric.paths == paths]
             rows = [row for row in result.groups if row.group == group and any(m.name in row.mean for m in part)]
             if part and rows:
-                columns = (Column("metric"), *(Column(row.kind, decimals=DECIMALS) for row in rows))
+                columns = (Column("metric"), *(Column(row.path_type, decimals=DECIMALS) for row in rows))
                 cells: list[tuple[Cell, ...]] = [(m.heading, *(_cell(row, m) for row in rows)) for m in part]
                 own = caption if paths == "all" else f"{group}, {paths} paths only"
                 tables.append(Table(columns, tuple(cells), own, _missing_note(rows, part)))
@@ -146,7 +148,7 @@ def _cell(row: GroupMetrics, metric: Metric) -> Spread:
 
 def _intervals(result: Comparison, metrics: Sequence[Metric]) -> Table | None:
     """Intervals of the means of driven paths; None where no group has one."""
-    driven = [row for row in result.groups if row.kind == DRIVEN]
+    driven = [row for row in result.groups if row.path_type == DRIVEN]
     known = [m for m in metrics if any(isfinite(row.half_interval.get(m.name, np.nan)) for row in driven)]
     rows: list[tuple[Cell, ...]] = [
         (row.group, row.participants, *(_interval(row, metric.name) for metric in known)) for row in driven
@@ -158,7 +160,7 @@ def _intervals(result: Comparison, metrics: Sequence[Metric]) -> Table | None:
 
 
 def _interval(row: GroupMetrics, name: str) -> Interval:
-    """Mean less and plus half the interval."""
+    """Mean minus and plus half the interval."""
     mean, half = row.mean.get(name, float("nan")), row.half_interval.get(name, float("nan"))
     return Interval(mean - half, mean + half)
 
@@ -174,7 +176,7 @@ def _numbers(result: Comparison, metrics: Sequence[Metric]) -> Table:
         values = (row.mean, row.std, row.half_interval, row.error, row.exact)
         numbers = [own.get(metric.name) for metric in metrics for own in values]
         reasons = [f"{name}: {reason} ({n})" for name, own in row.missing.items() for reason, n in own.items()]
-        rows.append((row.group, row.kind, row.count, *numbers, "; ".join(reasons)))
+        rows.append((row.group, row.path_type, row.count, *numbers, "; ".join(reasons)))
     return Table((*columns, Column("missing")), tuple(rows))
 
 
@@ -247,10 +249,10 @@ def _ranks(ranks: Sequence[Rank]) -> Table:
 
 def _legend(result: Comparison, metrics: Sequence[Metric]) -> list[str]:
     """The meaning of the metrics and of the types of paths."""
-    kinds = {row.kind if row.kind in KINDS else LEARNT for row in result.groups}
+    path_types = {row.path_type if row.path_type in PATH_TYPES else LEARNT for row in result.groups}
     lines = ["mean ± standard deviation over n demonstrations; of learnt paths of one path, in the scenes of n of them"]
     lines += [f"{metric.label}: {metric.definition}" for metric in metrics]
-    lines += [f"{kind}: {text}" for kind, text in KINDS.items() if kind in kinds]
+    lines += [f"{path_type}: {text}" for path_type, text in PATH_TYPES.items() if path_type in path_types]
     errors = [
         row.error[m.name] / row.std[m.name]
         for row in result.groups

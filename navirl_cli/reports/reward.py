@@ -88,7 +88,7 @@ def report_of(
         Heading("Learnt policy"),
         *_pictures(figures, "policy"),
         Heading("Path metrics"),
-        group_table(result, METRICS, "Mean ± standard deviation."),
+        group_table(result.groups, METRICS, "Mean ± standard deviation."),
         *_pictures(figures, "properties", "paths"),
         Heading("Ranks of the demonstrations"),
         Paragraph(f"R{uniform_line(ranks)[1:]}. Demonstrations that the reward was learnt from are included."),

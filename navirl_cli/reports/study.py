@@ -1,79 +1,79 @@
 """The report of a study, in words, tables and figures."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
 from navirl_cli import __version__
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
-from navirl_cli.evaluation.lines import LEAVES_M
+from navirl_cli.documents.tables import Cell, Column, Interval, Spread, Table
+from navirl_cli.evaluation.compare import DRIVEN
+from navirl_cli.evaluation.groups import GroupMetrics, mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.irl.fit import PAPER_L2
+from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
-from navirl_cli.reports.study_tables import (
-    answers_table,
-    claims_table,
-    closeness_table,
-    completion_table,
-    properties_table,
-    rewards_table,
-    signed,
-)
+from navirl_cli.reports.evaluation import DECIMALS, group_table
 from navirl_cli.study.claims import Claim
-from navirl_cli.study.learning import FIRST, SECOND, CycleFit
-from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, Study
+from navirl_cli.study.learning import FIRST, SECOND, CycleFit, Learnt
+from navirl_cli.study.measures import STUDY_METRICS
+from navirl_cli.study.pipeline import PUBLISHED_DEMONSTRATIONS, PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
 from navirl_cli.study.questionnaire import Answer, Shares
 
 #: Figures that a report can hold: name of the file and caption. The numbers are the paper's.
 FIGURES: Mapping[str, str] = {
     "fig2_completion_times": "Completion times of the obstacle course by modality: median, quartiles, whiskers to 1.5 "
     "interquartile ranges, and every participant (as the paper's Fig. 2).",
-    "fig3_paths": "Paths of which a person had a say, by condition (as the paper's Fig. 3).",
+    "fig3_paths": "Paths that a person influenced, by condition (as the paper's Fig. 3).",
     "fig4_answers": "Answers to the questionnaire (as the paper's Figs. 4 and 6).",
-    "fig5_replays": "Paths that the robot drove by itself (as the paper's Fig. 5).",
+    "fig5_replays": "Paths that the robot drove autonomously (as the paper's Fig. 5).",
     "fig7_properties": "Path properties by condition: mean and standard deviation over paths (as the paper's Fig. 7).",
     "fig8_pooled": "The reward learnt from all second cycles, in their scene: propagated policy and state reward (as "
     "the paper's Fig. 8).",
-    "fig9_unseen": "The same reward in scenes that nobody demonstrated in: two people in the hallway; a person beside "
-    "a large obstacle (as the paper's Fig. 9).",
+    "fig9_unseen": "The same reward in scenes without demonstrations: two people in the hallway; a person beside a "
+    "large obstacle (as the paper's Fig. 9).",
 }
 _INTRODUCTION = (
     "The method is that of Kollmitz, Koller, Boedecker and Burgard, Learning Human-Aware Robot Navigation from "
     "Physical Interaction via Inverse Reinforcement Learning, IROS 2020."
 )
 _VERDICTS = (
-    "Differences are paired by participant, each participant counting with the mean over the trials; intervals are "
-    "Student's. Paths count as close where the whole interval lies within the scatter (standard deviation) of a "
-    "participant's own second-cycle paths, and not close where it lies beyond: as near as the participant's paths are "
-    "to each other. Goodness of fit is no foresight: the policy was learnt from these very paths, so that only what "
-    "was not a feature of the reward is asked. What the interval does not decide is not settled by "
-    "so many participants, which is no evidence against it. Participants whose own difference speaks against a claim "
-    "stand under not so for."
+    "Differences are paired by participant. Each participant counts with the mean over their trials. The intervals "
+    "are Student's 95 % intervals. Paths count as close if the whole interval lies within the scatter (standard "
+    "deviation) of a participant's own second-cycle paths, and as not close if it lies outside. A claim is not "
+    "settled if the interval does not decide it. This is no evidence against the claim: there are too few "
+    "participants. Goodness of fit is no prediction, because the policy was learnt from the same paths. It is "
+    "therefore tested only on properties that are not features of the reward."
 )
 _UNIDENTIFIED = (
-    "Two demonstrations do not always tell four parameters. A parameter that is not identified, or on its bound, has "
-    "no standard error; one whose standard error exceeds half of its value rests on little. There the small "
-    "regulariser keeps the value from growing without end."
+    "Two demonstrations do not always determine four parameters. A parameter that is not identified, or is on its "
+    "bound, has no standard error. The data barely determine a parameter whose standard error exceeds half of its "
+    "value. In these cases the small regulariser keeps the value from growing without limit."
 )
 _ON_GRID = (
-    "A path through cells is up to 8 % longer than the line that was driven, so that these lengths do not compare with "
-    "those of the driven paths above. Expected lengths are exact; distances and areas are means over sampled paths. "
-    "Length is a feature of the reward, so that a policy learnt from these very paths expects their mean length by "
-    "construction; the policy of cycle 1 has not seen them."
+    "A path through cells is up to 8 % longer than the driven line. These lengths are therefore not comparable with "
+    "those of the driven paths above. Expected lengths are exact. Distances and areas are means over sampled paths. "
+    "Length is a feature of the reward: a policy expects the mean length of the paths that it was learnt from. The "
+    "policy of cycle 1 was not learnt from the paths of cycle 2."
+)
+_ERRORS = (
+    "Standard errors come from the observed information, which treats all participants as alike. For all participants"
+    " together a second row gives them from the scatter between participants."
 )
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What a report tells beside the study's numbers."""
+class StudyContext:
+    """What a report states beside the study's numbers."""
 
-    #: Logs read.
+    #: Names of the logs.
     logs: Sequence[str]
-    #: What was odd, skipped or lost, in words.
+    #: What is unusual, skipped or lost, in words.
     notes: Sequence[str]
     #: Published paths, and whether our cells are the same.
     cells: Sequence[tuple[str, bool]]
@@ -85,137 +85,59 @@ class Told:
     seed: int
 
 
-def report_of(study: Study, told: Told) -> Report:
+def report_of(study: Study, context: StudyContext) -> Report:
     """Compose the report.
 
     Args:
         study: The numbers.
-        told: What else it tells.
+        context: What else it states.
     """
     everyone = len({one.participant for one in study.demonstrations})
     people = f"{everyone} participant{'s' if everyone > 1 else ''}"
     seconds = len(study.seconds)
-    what = f"{people}, {len(study.demonstrations)} trials, {seconds} of them in the second force cycle."
+    summary = f"{people}, {len(study.demonstrations)} trials, {seconds} of them in the second force cycle."
     blocks: list[Block] = [
-        Paragraph(f"{what} {_INTRODUCTION}"),
-        Heading("The paper's claims, asked of these participants"),
-        Bullets(tuple(claims_lines(study.claims, mark="**"))),
-        claims_table(study.claims),
+        Paragraph(f"{summary} {_INTRODUCTION}"),
+        Heading("The paper's claims, tested with these participants"),
+        Bullets(tuple(_claims_lines(study.claims))),
+        _claims_table(study.claims),
         Paragraph(_VERDICTS),
-        *_tasks(study, told),
+        *_tasks(study, context),
         Heading("Paths"),
-        *_pictures(told, "fig3_paths", "fig5_replays"),
+        *_pictures(context, "fig3_paths", "fig5_replays"),
         Heading("Path properties"),
-        properties_table(study.groups),
-        _definitions(),
-        *_pictures(told, "fig7_properties"),
+        *_properties(study.groups),
+        *_pictures(context, "fig7_properties"),
         Heading("Learnt rewards"),
         *_rewards(study),
         Heading("Learnt policies beside the second cycle"),
-        closeness_table(study),
+        _closeness_table(study),
         Paragraph(_ON_GRID),
-        *_pictures(told, "fig8_pooled", "fig9_unseen"),
-        Heading("What was read"),
-        *_read(told),
-        Heading("How it was computed"),
-        _method(told),
+        *_pictures(context, "fig8_pooled", "fig9_unseen"),
+        Heading("Logs"),
+        *_logs(context),
+        Heading("Method"),
+        _method(context),
     ]
     return Report(f"User study with {people}", tuple(blocks), f"navirl {__version__}")
 
 
-def claims_lines(claims: Sequence[Claim], mark: str = "") -> list[str]:
-    """Verdict, claim and numbers, one line each.
+def overview_of(study: Study, context: StudyContext) -> list[Block]:
+    """What the command prints: the learnt rewards and the verdicts.
 
     Args:
-        claims: The claims.
-        mark: What stands on both sides of a verdict.
+        study: The numbers.
+        context: What else the report states.
     """
-    lines = []
-    for claim in claims:
-        said = "; ".join(f"{one.what} {signed(one.paired.mean, one.unit)}" for one in claim.differences)
-        lines.append(f"{mark}{claim.verdict.value}{mark}: {claim.text} ({claim.asked}: {said}.)")
-    return lines
-
-
-def _pictures(told: Told, *names: str) -> list[Block]:
-    return [Picture(told.figures[name], FIGURES[name]) for name in names if name in told.figures]
-
-
-def _tasks(study: Study, told: Told) -> list[Block]:
-    """The obstacle course and the questionnaire, where there are any."""
-    blocks: list[Block] = []
-    if study.completion_s:
-        blocks += [Heading("Obstacle course"), completion_table(study.completion_s)]
-        blocks += _pictures(told, "fig2_completion_times")
-    if "fig4_answers" in told.figures:
-        blocks += [Heading("Questionnaire"), answers_table(told.answers), *_pictures(told, "fig4_answers")]
+    blocks: list[Block] = [_rewards_table(study), Bullets(tuple(_claims_lines(study.claims)))]
+    if context.cells:
+        same = sum(same for _, same in context.cells)
+        blocks.append(Paragraph(f"cells as published: {same} of {len(context.cells)} paths"))
     return blocks
-
-
-def _definitions() -> Bullets:
-    own = [f"{metric.label}: {metric.definition}" for metric in PAPER_METRICS]
-    leaves = f"leaves before person: way left to the first person, along the nominal path, when {LEAVES_M:g} m off it"
-    leaves += "; of the paths, counted in brackets, that start on it and leave it by as much"
-    return Bullets((*own, "distance of centres: the least distance of the robot's centre from a person's", leaves))
-
-
-def _rewards(study: Study) -> list[Block]:
-    """Parameters, and what to think of them."""
-    blocks: list[Block] = [rewards_table(study)]
-    pooled = study.pooled.second
-    if pooled is not None and study.published_log_likelihood is not None:
-        published, here = study.published_log_likelihood, len({one.participant for one in study.seconds})
-        gain = pooled.fit.log_likelihood - published
-        blocks.append(
-            Paragraph(
-                f"The published parameters were learnt from the second cycles of {PUBLISHED_PARTICIPANTS} people. "
-                f"Under them the second cycles of the {here} here have a log-likelihood of {published:.4f}, under the "
-                f"pooled fit {pooled.fit.log_likelihood:.4f}: a difference of {signed(gain)} nats."
-            )
-        )
-    cycles = [cycle for one in study.participants for cycle in (one.first, one.second) if cycle is not None]
-    if any(_is_weak(cycle) for cycle in cycles):
-        blocks.append(Paragraph(_UNIDENTIFIED))
-    return blocks
-
-
-def _is_weak(cycle: CycleFit) -> bool:
-    """Whether a fit is unsure of a parameter: it did not converge, or a standard error exceeds half of its value."""
-    values, errors = np.abs(cycle.fit.reward.theta), cycle.fit.standard_errors
-    return cycle.fit.status is not Status.CONVERGED or bool((errors > values / 2).any())
-
-
-def _read(told: Told) -> list[Block]:
-    """Logs, cells beside published ones, and notes."""
-    blocks: list[Block] = [Paragraph(f"{len(told.logs)} logs: {', '.join(f'`{log}`' for log in told.logs)}.")]
-    if told.cells:
-        other = sorted(name for name, same in told.cells if not same)
-        extra = f"; others: {', '.join(other)}" if other else ""
-        same = len(told.cells) - len(other)
-        blocks.append(Paragraph(f"Cells equal to those published: **{same} of {len(told.cells)} paths**{extra}."))
-    return [*blocks, Bullets(tuple(told.notes))] if told.notes else blocks
-
-
-def _method(told: Told) -> Bullets:
-    """Settings that the numbers depend on."""
-    start = ", ".join(f"{p.name} = {p.initial:g} {p.unit}".strip() for p in Reward.named({}).parameters)
-    second = (
-        "The second cycle is fitted from the first's result, all second cycles together from the same start as the "
-        "first. Newton's method tries a second start of its own, so that the start hardly matters."
-    )
-    return Bullets(
-        (
-            f"The first cycle of each participant is fitted from {start}.",
-            second,
-            f"The paper's regulariser: {PAPER_L2 / 2:g} nats on the squares of c0/(10 /m), a_g, a_p and sigma_p.",
-            f"{told.samples} paths were sampled from each policy in each scene, with seed {told.seed}.",
-            "Cells of 10 cm, by the study's rule from poses to cells.",
-        )
-    )
 
 
 def remarks(demonstrations: Sequence[Demonstration], answers: Iterable[Answer]) -> list[str]:
-    """Lines about all trials together.
+    """What a reader should know of all trials together.
 
     Args:
         demonstrations: Of the study.
@@ -225,29 +147,234 @@ def remarks(demonstrations: Sequence[Demonstration], answers: Iterable[Answer]) 
     maps = {(one.grid.origin_m, one.grid.shape, one.grid.resolution_m) for one in demonstrations}
     if len(maps) > 1:
         lines.append(
-            f"trials are on {len(maps)} maps: figures of paths lay them over each other, and that of the learnt policy "
-            "shows the scene of the first second-cycle trial"
+            f"trials are on {len(maps)} maps: figures of paths draw them over each other; the figure of the learnt "
+            "policy shows the scene of the first second-cycle trial"
         )
     radii = sorted({one.robot_radius_m for one in demonstrations})
     if len(radii) > 1:
         listed = ", ".join(f"{radius:g}" for radius in radii)
-        lines.append(f"robots of radii {listed} m are put together: distances from shells do not compare")
+        lines.append(f"robots of radii {listed} m are combined: distances from their shells are not comparable")
     pushed = [one for one in demonstrations if one.condition is Condition.FORCE]
     others = sorted({one.cycle for one in pushed if one.cycle is not None and one.cycle not in {FIRST, SECOND}})
     if others:
-        lines.append(
-            f"cycle {', '.join(map(str, others))}: shown, but nothing is fitted to it; fits are of cycles 1 and 2"
-        )
-    unsaid = sum(one.cycle is None and one.set is None for one in pushed)
-    if unsaid:
-        lines.append(f"{unsaid} trials of the condition force say neither cycle nor set: nothing is fitted to them")
+        lines.append(f"cycle {', '.join(map(str, others))}: shown, but not fitted; only cycles 1 and 2 are fitted")
+    unknown = sum(one.cycle is None and one.set is None for one in pushed)
+    if unknown:
+        lines.append(f"{unknown} trials of the condition force have neither cycle nor set: they are not fitted")
     aside = sorted({one.set for one in pushed if one.set is not None and one.cycle is not None})
     if aside:
         lines.append(
-            f"trials of the condition force in the sets {', '.join(aside)} are not fitted, though they say a cycle"
+            f"trials of the condition force in the sets {', '.join(aside)} are not fitted, although they have a cycle"
         )
     people = {one.participant for one in demonstrations}
     strangers = sorted({one.participant for one in answers} - people)
     if strangers:
         lines.append(f"the questionnaire holds answers of participants without a log: {', '.join(strangers)}")
     return lines
+
+
+def _claims_lines(claims: Sequence[Claim]) -> Iterator[str]:
+    """Verdict, claim and numbers, one line each."""
+    for claim in claims:
+        numbers = "; ".join(f"{one.quantity} {one.paired.mean:+.3f} {one.unit}" for one in claim.differences)
+        yield f"**{claim.verdict.value}**: {claim.text} ({claim.question}: {numbers}.)"
+
+
+def _claims_table(claims: Iterable[Claim]) -> Table:
+    """The differences that the verdicts rest on."""
+    columns = (
+        Column("claim"),
+        Column("quantity"),
+        Column("unit"),
+        Column("mean_difference", "mean difference", DECIMALS, sign=True),
+        Column("interval", "95 % interval", DECIMALS, sign=True),
+        Column("n"),
+        Column("margin", "close within ±", DECIMALS),
+        Column("participants_against", "participants against"),
+        Column("verdict"),
+    )
+    rows = tuple(
+        (
+            claim.title,
+            one.quantity,
+            one.unit,
+            one.paired.mean,
+            Interval(*one.paired.student),
+            one.paired.n,
+            one.margin,
+            ", ".join(one.against) or "none",
+            one.verdict.value,
+        )
+        for claim in claims
+        for one in claim.differences
+    )
+    notes = ["Claims of a larger value have no margin."]
+    if any(row[5] == 1 for row in rows):
+        notes.append("One participant has no interval.")
+    if any(one.margin is not None and np.isnan(one.margin) for claim in claims for one in claim.differences):
+        notes.append("A margin needs a participant with two second-cycle paths.")
+    return Table(columns, rows, "Paired differences over participants.", " ".join(notes))
+
+
+def _pictures(context: StudyContext, *names: str) -> list[Block]:
+    return [Picture(context.figures[name], FIGURES[name]) for name in names if name in context.figures]
+
+
+def _tasks(study: Study, context: StudyContext) -> list[Block]:
+    """The obstacle course and the questionnaire, where there are any."""
+    blocks: list[Block] = []
+    if study.completion_s:
+        blocks += [Heading("Obstacle course"), _completion_table(study.completion_s)]
+        blocks += _pictures(context, "fig2_completion_times")
+    if "fig4_answers" in context.figures:
+        blocks += [Heading("Questionnaire"), _answers_table(context.answers), *_pictures(context, "fig4_answers")]
+    return blocks
+
+
+def _completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]) -> Table:
+    """Completion times by modality."""
+    columns = (
+        Column("modality"),
+        Column("n"),
+        Column("median_s", "median s", 1),
+        Column("time_s", "mean ± standard deviation s", 1),
+    )
+    every = {modality: [time for own in known.values() for time in own] for modality, known in completion_s.items()}
+    rows = tuple(
+        (modality, len(times), median(times), Spread(*mean_and_spread(times))) for modality, times in every.items()
+    )
+    return Table(columns, rows, "Completion times.")
+
+
+def _answers_table(bars: Sequence[Shares]) -> Table:
+    """Answers by question and modality."""
+    levels = len(bars[0].counts) if bars else 0
+    columns = tuple(map(Column, ("question", "modality", "n")))
+    columns += (Column("median", decimals=1),)
+    columns += tuple(Column(f"answers_{level}", f"answers {level}") for level in range(1, levels + 1))
+    rows = tuple((one.question, one.modality, one.count, one.median, *one.counts.tolist()) for one in bars)
+    return Table(columns, rows, "Answers to the questionnaire.")
+
+
+def _properties(groups: Sequence[GroupMetrics]) -> list[Block]:
+    """Driven paths by group, and what the columns are."""
+    driven = [row for row in groups if row.path_type == DRIVEN]
+    caption = "Driven paths of trials with people, mean ± standard deviation over paths."
+    definitions = Bullets(tuple(f"{metric.label}: {metric.definition}" for metric in STUDY_METRICS))
+    return [group_table(driven, STUDY_METRICS, caption), definitions]
+
+
+def _rewards(study: Study) -> list[Block]:
+    """Parameters, and how far to rely on them."""
+    blocks: list[Block] = [_rewards_table(study), Paragraph(_ERRORS)]
+    pooled = study.pooled.second
+    if pooled is not None and study.published_log_likelihood is not None:
+        published, here = study.published_log_likelihood, len({one.participant for one in study.seconds})
+        gain = pooled.fit.log_likelihood - published
+        blocks.append(
+            Paragraph(
+                f"The published parameters were learnt from the second cycles of {PUBLISHED_PARTICIPANTS} people. "
+                f"Under them the second cycles of the {here} participants here have a log-likelihood of "
+                f"{published:.4f} nats, under the pooled fit {pooled.fit.log_likelihood:.4f} nats: a difference of "
+                f"{gain:+.3f} nats."
+            )
+        )
+    cycles = [cycle for one in study.participants for cycle in (one.first, one.second) if cycle is not None]
+    if any(_is_weak(cycle) for cycle in cycles):
+        blocks.append(Paragraph(_UNIDENTIFIED))
+    return blocks
+
+
+def _rewards_table(study: Study) -> Table:
+    """Parameters by participant and cycle, pooled, and as published."""
+    parameters = Reward.named({}).parameters
+    rows: list[tuple[Cell, ...]] = [
+        _fit_row(name, found.fit, found.fit.standard_errors) for name, found in _cycles(study)
+    ]
+    pooled = study.pooled.second
+    if pooled is not None and pooled.fit.clustered_errors is not None:
+        rows.append(_fit_row("all, errors by participant", pooled.fit, pooled.fit.clustered_errors))
+    note = ""
+    if study.published_log_likelihood is not None:
+        name = f"published, {PUBLISHED_PARTICIPANTS} participants"
+        values = [Spread(PUBLISHED_THETA[parameter.name], float("nan")) for parameter in parameters]
+        rows.append((name, PUBLISHED_DEMONSTRATIONS, *values, study.published_log_likelihood, "published"))
+        note = "The log-likelihood of the published parameters is that of the second cycles here."
+    columns = (
+        Column("learnt_from", "learnt from"),
+        Column("n"),
+        *(Column(parameter.name, f"{parameter.name} {parameter.unit}".strip(), DECIMALS) for parameter in parameters),
+        Column("log_likelihood", "log-likelihood", DECIMALS),
+        Column("status"),
+    )
+    return Table(columns, tuple(rows), "Parameters ± standard errors, lengths in metres.", note)
+
+
+def _fit_row(name: str, fit: Fit, errors: FloatArray) -> tuple[Cell, ...]:
+    values = [Spread(value, error) for value, error in zip(fit.reward.theta, errors.tolist(), strict=True)]
+    return name, fit.demonstrations, *values, fit.log_likelihood, fit.status.value
+
+
+def _cycles(study: Study) -> Iterator[tuple[str, CycleFit]]:
+    """What was learnt, with the names of participant and cycle."""
+    for one in (*study.participants, study.pooled):
+        for cycle, found in ((FIRST, one.first), (SECOND, one.second)):
+            if found is not None:
+                yield f"{_whose(one)}, cycle {cycle}", found
+
+
+def _whose(learnt: Learnt) -> str:
+    return "all" if learnt.participant is None else learnt.participant
+
+
+def _is_weak(cycle: CycleFit) -> bool:
+    """Whether a fit is unsure of a parameter: it did not converge, or a standard error exceeds half of its value."""
+    values, errors = np.abs(cycle.fit.reward.theta), cycle.fit.standard_errors
+    return cycle.fit.status is not Status.CONVERGED or bool((errors > values / 2).any())
+
+
+def _closeness_table(study: Study) -> Table:
+    """Expected properties beside demonstrated ones."""
+    names = ("demonstrated", "expected")
+    columns = tuple(Column(f"{m.name}_{name}", f"{m.heading}: {name}", 2) for m in PAPER_METRICS for name in names)
+    rows: list[tuple[Cell, ...]] = []
+    for name, found in _cycles(study):
+        if found.near is not None:
+            both = (found.near.demonstrated, found.near.learnt)
+            cells = (Spread(row.expected(m.name), row.std[m.name]) for m in PAPER_METRICS for row in both)
+            rows.append((name, *cells))
+    caption = (
+        "Paths of the second cycle through the centres of their cells (mean ± standard deviation over paths), and the "
+        "policy's expectation in their scenes (mean ± standard deviation of one path)."
+    )
+    return Table((Column("policy_of", "policy of"), *columns), tuple(rows), caption)
+
+
+def _logs(context: StudyContext) -> list[Block]:
+    """Logs, cells beside published ones, and notes."""
+    logs = ", ".join(f"`{log}`" for log in context.logs)
+    blocks: list[Block] = [Paragraph(f"{len(context.logs)} logs: {logs}.")]
+    if context.cells:
+        other = sorted(name for name, same in context.cells if not same)
+        extra = f"; others: {', '.join(other)}" if other else ""
+        same = len(context.cells) - len(other)
+        blocks.append(Paragraph(f"Cells equal to those published: **{same} of {len(context.cells)} paths**{extra}."))
+    return [*blocks, Bullets(tuple(context.notes))] if context.notes else blocks
+
+
+def _method(context: StudyContext) -> Bullets:
+    """Settings that the numbers depend on."""
+    start = ", ".join(f"{p.name} = {p.initial:g} {p.unit}".strip() for p in Reward.named({}).parameters)
+    second = (
+        "The second cycle is fitted from the first's result, all second cycles together from the same start as the "
+        "first. Newton's method tries a second start of its own, so the result hardly depends on the start."
+    )
+    return Bullets(
+        (
+            f"The first cycle of each participant is fitted from {start}.",
+            second,
+            f"The paper's regulariser: {PAPER_L2 / 2:g} nats on the squares of c0/(10 /m), a_g, a_p and sigma_p.",
+            f"{context.samples} paths were sampled from each policy in each scene, with seed {context.seed}.",
+            "Cells of 10 cm, by the study's rule from poses to cells.",
+        )
+    )

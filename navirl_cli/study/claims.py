@@ -1,4 +1,4 @@
-"""What the paper says of its paths, asked of the participants at hand, in differences with intervals."""
+"""The paper's claims about its paths, tested with the participants at hand: differences with intervals."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from navirl_cli.study.learning import Learnt
 from navirl_cli.study.measures import with_people
 
 SECOND_CYCLE, JOYSTICK, REPLAY = "force, cycle 2", "joystick", "replay of the learnt policy"
-#: Groups of a robot that only avoids obstacles: as an imported study calls them, and as a log that says no more.
+#: Groups of a robot that only avoids obstacles: as an imported study names them, and without a set in the log.
 AVOIDANCE = ("obstacle avoidance", "autonomous")
 
 
 class Verdict(StrEnum):
-    """What the participants say of a claim."""
+    """What the differences show of a claim."""
 
     HOLDS = "holds"
     FAILS = "does not hold"
@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 class Difference:
     """A paired difference between two types of paths, over participants."""
 
-    what: str
+    quantity: str
     unit: str
     paired: Paired
     #: For closeness: how far a participant's own second-cycle paths scatter, within which paths count as close.
@@ -39,7 +39,7 @@ class Difference:
 
     @property
     def against(self) -> list[str]:
-        """Participants whose own difference speaks against the claim."""
+        """Participants whose own difference contradicts the claim."""
         if self.margin is None:
             return [name for name, value in self.paired.differences.items() if value <= 0]
         return [name for name, value in self.paired.differences.items() if abs(value) >= self.margin]
@@ -58,13 +58,13 @@ class Difference:
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim and what speaks for or against it."""
+    """One claim and the differences that decide it."""
 
     #: In a few words.
     title: str
     text: str
-    #: How it was asked.
-    asked: str
+    #: Which difference was tested.
+    question: str
     differences: tuple[Difference, ...]
 
     @property
@@ -75,11 +75,11 @@ class Claim:
 
 
 def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]:
-    """The paper's claims that the data at hand can be asked.
+    """The paper's claims that the data at hand can decide on.
 
     Args:
         rows: Measured paths.
-        learnt: Fits by participant; a pooled one is passed over.
+        learnt: Fits by participant; a pooled one is ignored.
     """
     rows = with_people(rows)  # as in the tables
     groups = {row.group for row in rows}
@@ -96,24 +96,24 @@ def claims_of(rows: Sequence[Measured], learnt: Sequence[Learnt]) -> list[Claim]
 
 
 def _difference(
-    what: str, unit: str, one: Mapping[str, float], other: Mapping[str, float], margin: float | None = None
+    quantity: str, unit: str, one: Mapping[str, float], other: Mapping[str, float], margin: float | None = None
 ) -> Difference | None:
     """One minus the other; None where no participant has both."""
     found = paired(one, other)
-    return Difference(what, unit, found, margin) if found.n else None
+    return Difference(quantity, unit, found, margin) if found.n else None
 
 
 def _kept(differences: Sequence[Difference | None]) -> tuple[Difference, ...]:
     return tuple(difference for difference in differences if difference is not None)
 
 
-def _of(rows: Sequence[Measured], group: str, name: str, kind: str = DRIVEN) -> Mapping[str, float]:
+def _of(rows: Sequence[Measured], group: str, name: str, path_type: str = DRIVEN) -> Mapping[str, float]:
     """A metric in a group, by participant."""
-    return by_participant([row for row in rows if row.group == group], kind, name)
+    return by_participant([row for row in rows if row.group == group], path_type, name)
 
 
 def _close(
-    rows: Sequence[Measured], kind: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
+    rows: Sequence[Measured], path_type: str, one: Callable[[str], Mapping[str, float]], metrics: Sequence[Metric]
 ) -> tuple[Difference, ...]:
     """Each metric's values minus the second cycle's, with the scatter within participants as the margin."""
     return _kept(
@@ -122,20 +122,20 @@ def _close(
                 metric.label,
                 metric.unit,
                 one(metric.name),
-                _of(rows, SECOND_CYCLE, metric.name, kind),
-                scatter_within(rows, kind, metric.name),
+                _of(rows, SECOND_CYCLE, metric.name, path_type),
+                scatter_within(rows, path_type, metric.name),
             )
             for metric in metrics
         ]
     )
 
 
-def scatter_within(rows: Sequence[Measured], kind: str, name: str) -> float:
+def scatter_within(rows: Sequence[Measured], path_type: str, name: str) -> float:
     """Pooled standard deviation of a participant's second-cycle paths about their own mean; NaN where all have one."""
     own: dict[str, list[float]] = {}
     for row in rows:
         if row.group == SECOND_CYCLE:
-            own.setdefault(row.participant, []).append(row.values[kind][name])
+            own.setdefault(row.participant, []).append(row.values[path_type][name])
     squares = sum(float(np.var(values)) * len(values) for values in own.values())
     freedom = sum(len(values) - 1 for values in own.values())
     return float(np.sqrt(squares / freedom)) if freedom else float("nan")
@@ -146,7 +146,7 @@ def _replays(rows: Sequence[Measured]) -> Claim:
     return Claim(
         "replays",
         "The learnt policy's paths are close to those of the second force cycle (replays that the robot drove).",
-        f"Replay of the learnt policy less {SECOND_CYCLE}, driven paths",
+        f"Replay of the learnt policy - {SECOND_CYCLE}, driven paths",
         _close(rows, DRIVEN, lambda name: _of(rows, REPLAY, name), PAPER_METRICS),
     )
 
@@ -166,44 +166,45 @@ def _expected(rows: Sequence[Measured], learnt: Sequence[Learnt], *, own: bool) 
         title = "goodness of fit"
         text = "The learnt policy's paths are close to those of the second force cycle, from which it was learnt."
     else:
-        title = "foretold from cycle 1"
-        text = "What was learnt from the first cycle foretells the second cycle's paths."
-    return Claim(title, text, f"Expected under the policy less {SECOND_CYCLE}, paths through cells", differences)
+        title = "predicted from cycle 1"
+        text = "The policy learnt from the first cycle predicts the second cycle's paths."
+    return Claim(title, text, f"Expected under the policy - {SECOND_CYCLE}, paths through cells", differences)
 
 
 def _joystick(rows: Sequence[Measured]) -> Claim:
-    """Distances."""
+    """The distances of joystick and force paths."""
     joystick, force = (_of(rows, group, "min_center_distance_m") for group in (JOYSTICK, SECOND_CYCLE))
     return Claim(
         "joystick",
         "Paths steered by joystick keep a larger distance to the person than paths of the second force cycle.",
-        f"Joystick less {SECOND_CYCLE}, driven paths",
+        f"Joystick - {SECOND_CYCLE}, driven paths",
         _kept([_difference("min. distance", "m", joystick, force)]),
     )
 
 
 def _who(avoidance: str) -> str:
-    """How a group of a robot without a person's say is called."""
+    """The name of a robot that no person steers."""
     return "Obstacle avoidance" if avoidance == AVOIDANCE[0] else "The robot by itself (autonomous)"
 
 
 def _latest(rows: Sequence[Measured], avoidance: str) -> Claim:
-    """Where paths leave the nominal one."""
+    """Where paths leave the nominal path."""
     wished, alone = (_of(rows, group, "onset_m") for group in (SECOND_CYCLE, avoidance))
     return Claim(
         "late avoidance",
-        f"{_who(avoidance)} begins to give way later than people wish.",
-        f"Way left to the person when the path is {LEAVES_M:g} m off the nominal one: {SECOND_CYCLE} less {avoidance}",
-        _kept([_difference("way left to the person", "m", wished, alone)]),
+        f"{_who(avoidance)} leaves the nominal path later than people wish.",
+        f"Distance to the person where the path has left the nominal path by {LEAVES_M:g} m: "
+        f"{SECOND_CYCLE} - {avoidance}",
+        _kept([_difference("avoidance onset", "m", wished, alone)]),
     )
 
 
 def _smallest(rows: Sequence[Measured], avoidance: str, others: Sequence[str]) -> Claim:
-    """Areas under all paths."""
+    """The areas under all paths."""
     least = _of(rows, avoidance, "area_m2")
     return Claim(
         "smallest area",
         f"{_who(avoidance)} takes the paths with the smallest area under them.",
-        f"Each other group less {avoidance}, driven paths",
+        f"Each other group - {avoidance}, driven paths",
         _kept([_difference(f"area, {group}", "m²", _of(rows, group, "area_m2"), least) for group in others]),
     )

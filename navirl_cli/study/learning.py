@@ -48,7 +48,7 @@ class Learnt:
     #: From the second cycle, warm-started from the first.
     second: CycleFit | None
     #: What could not be done, and why.
-    trouble: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def learn(job: Job) -> Learnt:
     seconds = job.of_cycle(SECOND)
     reward = Reward.named({})
     found: dict[int, CycleFit] = {}
-    trouble = []
+    problems = []
     for cycle in (FIRST, SECOND):
         shown = job.of_cycle(cycle)
         try:
@@ -107,8 +107,8 @@ def learn(job: Job) -> Learnt:
                 near = closeness(reward, seconds, job.samples, rng)
                 found[cycle] = replace(found[cycle], near=near)
         except NavirlError as error:
-            trouble.append(f"{job.participant or 'all'}, cycle {cycle}: {error}")
-    return Learnt(job.participant, found.get(FIRST), found.get(SECOND), tuple(trouble))
+            problems.append(f"{job.participant or 'all'}, cycle {cycle}: {error}")
+    return Learnt(job.participant, found.get(FIRST), found.get(SECOND), tuple(problems))
 
 
 def closeness(
@@ -129,5 +129,5 @@ def closeness(
         RewardError: The reward has no policy in a scene.
     """
     found = compare(demonstrations, {LEARNT: reward}, Precision(samples), rng).groups
-    shown, learnt = (next(row for row in found if row.kind == kind) for kind in (ON_GRID, LEARNT))
+    shown, learnt = (next(row for row in found if row.path_type == path_type) for path_type in (ON_GRID, LEARNT))
     return Closeness(shown, learnt)

@@ -43,4 +43,4 @@ def groups_of(demonstrations: Iterable[Demonstration], rows: Iterable[Measured])
     for row in with_people(rows):
         members.setdefault(row.group, []).append(row)
     known = [group for group in by_group(demonstrations) if group in members]
-    return [summary_of(group, kind, members[group]) for group in known for kind in (DRIVEN, ON_GRID)]
+    return [summary_of(group, path_type, members[group]) for group in known for path_type in (DRIVEN, ON_GRID)]

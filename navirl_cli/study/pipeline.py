@@ -23,12 +23,12 @@ PUBLISHED_THETA = {
     "a_p": -4.90718793869,
     "sigma_p": 1.679498831347,
 }
-PUBLISHED_PARTICIPANTS = 13
+PUBLISHED_PARTICIPANTS, PUBLISHED_DEMONSTRATIONS = 13, 26
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Everything that the report of a study tells."""
+    """Everything that the report of a study contains."""
 
     demonstrations: tuple[Demonstration, ...]
     rows: tuple[Measured, ...]
@@ -72,7 +72,7 @@ def study_of(
 
     Raises:
         DemonstrationError: There is no second cycle to learn from.
-        SceneError: A demonstration's scene has no way from start to goal.
+        SceneError: A demonstration's scene has no path from start to goal.
     """
     if not any(is_of_cycle(one, SECOND) for one in demonstrations):
         raise _refusal(demonstrations)
@@ -106,11 +106,11 @@ def _published_log_likelihood(demonstrations: Sequence[Demonstration], published
 def _refusal(demonstrations: Sequence[Demonstration]) -> DemonstrationError:
     """What is missing for a study, and what is there."""
     pushed = [one for one in demonstrations if one.condition is Condition.FORCE]
-    kinds = sorted(
+    found = sorted(
         {f"{'no cycle' if one.cycle is None else f'cycle {one.cycle}'}, {one.set or 'no set'}" for one in pushed}
     )
-    there = f"{len(pushed)} trials of it ({'; '.join(kinds)})" if pushed else "none of that condition"
+    there = f"{len(pushed)} trials of it ({'; '.join(found)})" if pushed else "no trial of that condition"
     return DemonstrationError(
-        f"a study needs trials of the condition force in cycle {SECOND} and without a set, found {there}; say which "
-        "trial is what in the logs' metadata record navirl.session, as the README has it"
+        f"a study needs trials of the condition force in cycle {SECOND} and without a set, found {there}; "
+        "describe the trials in the logs' metadata record navirl.session (see the documentation of session records)"
     )

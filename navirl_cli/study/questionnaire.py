@@ -13,7 +13,7 @@ from navirl_cli.errors import ArtefactError, brief
 
 #: Columns in any order; the modality's may be missing.
 COLUMNS, OPTIONAL = ("participant", "question", "modality", "answer"), "modality"
-#: Levels of a scale where nothing else is said.
+#: Default number of levels of a scale.
 LEVELS = 5
 _HEADER = "a header of participant,question,modality,answer"
 _REMEDY = 'save it as "CSV UTF-8"'
@@ -85,7 +85,7 @@ def read_answers(path: Path, levels: int = LEVELS) -> list[Answer]:
         The answers as they stand in the file.
 
     Raises:
-        ArtefactError: The file cannot be read or is not as described, an answer is no level, or somebody answers a
+        ArtefactError: The file cannot be read or is not as described, an answer is no level, or one person answers a
             question about a modality twice.
     """
     rows = _rows(path, _text(path))
@@ -111,7 +111,7 @@ def read_answers(path: Path, levels: int = LEVELS) -> list[Answer]:
             )
         answers.append(one)
     if not answers:
-        raise ArtefactError(f"{path}: expected answers below the header, found none; add a line for each")
+        raise ArtefactError(f"{path}: expected answers below the header, found none; add one line per answer")
     return answers
 
 
@@ -165,7 +165,7 @@ def _answer(where: str, cells: dict[str, str], levels: int) -> Answer:
             raise ArtefactError(f"{where}, column {name}: expected a text, found nothing; fill it in")
     text, expected = cells["answer"], f"expected a whole number from 1 to {levels}"
     if not text:
-        raise ArtefactError(f"{where}, column answer: {expected}, found nothing; remove the line of who gave no answer")
+        raise ArtefactError(f"{where}, column answer: {expected}, found nothing; remove the line")
     if not (text.isascii() and text.isdecimal() and len(text) < 10 and 1 <= int(text) <= levels):
         raise ArtefactError(f"{where}, column answer: {expected}, found {brief(text)}; correct the answer")
     return Answer(cells["participant"], cells["question"], cells.get("modality", ""), int(text))

@@ -52,24 +52,24 @@ def pooled_policy(study: Study) -> PooledPolicy:
 
 
 def two_people(scene: Scene) -> Scene:
-    """Two people in the scene's hallway, one on each side of the way.
+    """Two people in the scene's hallway, one on each side of the path.
 
     Raises:
-        SceneError: No way is left.
+        SceneError: No path is left.
     """
     places = [_beside(scene, share, side * ASIDE_M) for share, side in zip(SHARES, (1, -1), strict=True)]
     return _scene(scene, scene.lattice.grid, np.array(places))
 
 
 def beside_obstacle(scene: Scene, robot_radius_m: float) -> Scene:
-    """A person on one side of the way and a large obstacle on the other.
+    """A person on one side of the path and a large obstacle on the other.
 
     Args:
         scene: Gives the hallway.
         robot_radius_m: The obstacle is grown by it, m.
 
     Raises:
-        SceneError: No way is left.
+        SceneError: No path is left.
     """
     grid = scene.lattice.grid
     along, across = _axes(scene)
@@ -90,7 +90,7 @@ def _axes(scene: Scene) -> tuple[FloatArray, FloatArray]:
 
 
 def _beside(scene: Scene, share: float, left_m: float) -> FloatArray:
-    """(2,) m: a place beside the straight way from start to goal."""
+    """(2,) m: a place beside the straight line from start to goal."""
     start, goal = scene.lattice.xy_m[[scene.start, scene.goal]]
     place: FloatArray = start + share * (goal - start) + left_m * _axes(scene)[1]
     return place
