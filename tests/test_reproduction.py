@@ -140,11 +140,7 @@ def test_completion_times_are_the_published_ones(summary):
             assert summary["completion_s"][modality][run] == [float(text)]
 
 
-<<<<<<< HEAD
-def test_which_claims_hold_is_reported(summary, written):
-=======
 def test_verdicts_are_in_the_report(summary, written):
->>>>>>> evaluation
     verdicts = {claim["claim"]: claim["verdict"] for claim in summary["claims"]}
     assert len(verdicts) == 6
     assert verdicts["Obstacle avoidance leaves the nominal path later than people wish."] == "holds"
