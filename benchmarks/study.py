@@ -1,4 +1,4 @@
-"""Time the published study as a user waits for it: a path onto the grid, drawn paths, import, the whole evaluation.
+"""Time what a user of the published study waits for: rasterisation, drawn paths and their metrics, import, evaluation.
 
 python benchmarks/study.py [--quick] [--json]. Needs the published data (environment variable NAVIRL_STUDY_DIR: the
 unpacked runs, or the archive). Each row ends with its bar; exit 0 only where every bar holds. The bars are for four

@@ -1,5 +1,6 @@
 """Length, distance and area: closed forms and slow twins."""
 
+import pickle
 import re
 from itertools import pairwise
 from math import cos, pi, sin, sqrt
@@ -68,13 +69,17 @@ def test_area_against_a_fine_raster_and_an_integral(seed):
     assert area == pytest.approx(area_between_m2(other, one), rel=1e-9)
 
 
+@pytest.mark.parametrize("within", [False, True])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_area_beside_a_straight_path_is_that_of_the_faces(seed):
+def test_the_area_beside_a_straight_path_is_that_of_the_faces(seed, within):
     # A corner of a nanometre in the nominal path does not change the areas, but asks for the faces.
     rng = np.random.default_rng(seed)
     steps = rng.uniform([-0.05 if seed % 2 else 0.0, -0.2], [0.3, 0.2], (20, 40, 2))
     lines = np.cumsum(steps, axis=1) + np.array([0.1, 0.0])
     nominal = np.array([[0.0, 0.05], [lines[..., 0].max() + 0.1, 0.05]])
+    if within:  # the paths begin and end on the line of a nominal path that is shorter than they are
+        lines[:, [0, -1], 1] = 0.05
+        nominal[:, 0] = 0.3, lines[:, -1, 0].min() - 0.1
     bent = np.insert(nominal, 1, nominal.mean(axis=0) + np.array([0.0, 1e-9]), axis=0)
     turn = np.array([[cos(0.3 * seed), -sin(0.3 * seed)], [sin(0.3 * seed), cos(0.3 * seed)]])
     found, expected = areas_m2(lines @ turn, nominal @ turn), areas_m2(lines @ turn, bent @ turn)
@@ -160,6 +165,10 @@ def test_a_metric_is_computed_in_one_way():
         Metric("both_m", "both", "m", "", lines=lambda lines: lines.length_m, drive=lambda drive: drive.duration_s)
     with pytest.raises(ValueError, match="metric neither_m: needs exactly one of"):
         Metric("neither_m", "neither", "m", "")
+
+
+def test_a_metric_is_itself_after_pickling():
+    assert all(pickle.loads(pickle.dumps(metric)) is metric for metric in METRICS)
 
 
 def test_only_what_is_asked_for_is_computed():

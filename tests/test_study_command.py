@@ -10,6 +10,7 @@ from robot_log import Run, write_run
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.artefacts.store import read_json
+from navirl_cli.artefacts.study import read_study
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.compare import DRIVEN, compare
 from navirl_cli.evaluation.drawn import Precision
@@ -40,7 +41,7 @@ def written(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def summary(written):
-    return read_json(written[0] / "summary.json", "study")
+    return read_study(written[0] / "summary.json")
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,10 @@
 """Every number of a study's report as JSON."""
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
-from navirl_cli.artefacts.store import number
+from navirl_cli.artefacts.store import number, read_json
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import Values
@@ -55,6 +56,15 @@ def study_document(study: Study, cells: Sequence[tuple[str, bool]], answers: Seq
             for row in study.rows
         ],
     }
+
+
+def read_study(path: Path) -> dict[str, Any]:
+    """Read a study's summary.
+
+    Raises:
+        ArtefactError: The file is missing, no summary of a study, or breaks its schema.
+    """
+    return read_json(path, "study")
 
 
 def _numbers(values: Values) -> dict[str, float | None]:

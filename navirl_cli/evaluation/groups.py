@@ -23,7 +23,7 @@ FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class GroupMetrics(ByContent):
-    """Mean and spread of the paths of one path_type in one group of demonstrations."""
+    """Mean and spread of the paths of one type in one group of demonstrations."""
 
     group: str
     path_type: str

@@ -158,7 +158,11 @@ def _areas_along(lines_m: FloatArray, nominal_m: FloatArray) -> FloatArray:
     crossing = aside[:, 1:] * aside[:, :-1] < 0
     # Where a segment crosses the nominal path, two triangles are left of the trapezium.
     height = np.where(crossing, (beside[:, 1:] ** 2 + beside[:, :-1] ** 2) / np.where(crossing, summed, 1.0), summed)
-    areas: FloatArray = np.where((steps > -ROUNDING_M).all(axis=1), (height * steps).sum(axis=1) / 2, np.nan)
+    backwards = steps < -ROUNDING_M
+    # The joins of the ends may lie on the nominal path: a robot starts somewhere within its cell.
+    backwards[:, 0] &= beside[:, 1] > ROUNDING_M
+    backwards[:, -1] &= beside[:, -2] > ROUNDING_M
+    areas: FloatArray = np.where(backwards.any(axis=1), np.nan, (height * steps).sum(axis=1) / 2)
     return areas
 
 

@@ -17,6 +17,8 @@ DRAWS = 4000
 MORE_M, BESIDE_M = 0.1, 0.5
 
 Theta = Mapping[str, float]
+#: Text, unit, the parameters that it needs, and its value.
+Quantity = tuple[str, str, tuple[str, ...], Callable[[Theta], float]]
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,25 @@ def meanings(
         distance_m: At which people were passed, centre to centre, m; NaN without people.
         rng: Source of randomness of the intervals.
     """
-    wanted: list[tuple[str, str, tuple[str, ...], Callable[[Theta], float]]] = [
+    names = [parameter.name for parameter in reward.parameters]
+    estimate = dict(zip(names, reward.theta, strict=True))
+    known = np.isfinite(np.diag(covariance))
+    draws = _draws(reward, covariance, known, rng)
+    found = []
+    for text, unit, on, value in _quantities(resolution_m, distance_m):
+        lower = upper = float("nan")
+        if not set(on) <= set(names):
+            continue
+        if all(known[names.index(name)] for name in on):
+            drawn = [value(dict(zip(names, row, strict=True))) for row in draws]
+            lower, upper = (float(edge) for edge in np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+        found.append(Meaning(text, unit, value(estimate), lower, upper))
+    return found
+
+
+def _quantities(resolution_m: float, distance_m: float) -> list[Quantity]:
+    """All quantities; arguments as of :func:`meanings`."""
+    wanted: list[Quantity] = [
         (
             "The personal-space reward falls to one half at a distance between centres of",
             "m",
@@ -92,7 +112,7 @@ def meanings(
         ),
         ("It falls to one tenth at", "m", ("sigma_p",), tenth_distance_m),
         (
-            f"A path that is {MORE_M:g} m longer is as likely as the shorter path, multiplied by",
+            f"The probability of a path that is {MORE_M:g} m longer, divided by that of the shorter path, is",
             "",
             ("c0",),
             longer_path_odds,
@@ -111,20 +131,7 @@ def meanings(
         )
         detour = partial(accepted_detour_m, distance_m=distance_m, resolution_m=resolution_m)
         wanted.append((passed, "m", ("c0", "a_p", "sigma_p"), detour))
-    names = [parameter.name for parameter in reward.parameters]
-    estimate = dict(zip(names, reward.theta, strict=True))
-    known = np.isfinite(np.diag(covariance))
-    draws = _draws(reward, covariance, known, rng)
-    found = []
-    for text, unit, on, value in wanted:
-        lower = upper = float("nan")
-        if not set(on) <= set(names):
-            continue
-        if all(known[names.index(name)] for name in on):
-            drawn = [value(dict(zip(names, row, strict=True))) for row in draws]
-            lower, upper = (float(edge) for edge in np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
-        found.append(Meaning(text, unit, value(estimate), lower, upper))
-    return found
+    return wanted
 
 
 def _draws(reward: Reward, covariance: FloatArray, known: np.ndarray, rng: np.random.Generator) -> list[list[float]]:

@@ -7,6 +7,7 @@ completions and the page of metrics read METRICS.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -84,6 +85,12 @@ class Metric:
         """Check that there is one function."""
         if sum(function is not None for function in (self.lines, self.drive, self.near)) != 1:
             raise ValueError(f"metric {self.name}: needs exactly one of lines, drive and near")
+
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        """Pickle a metric of METRICS by its name: functions without a name do not cross processes."""
+        if BY_NAME.get(self.name) is self:
+            return metric_named, (self.name,)
+        return super().__reduce__()
 
     @property
     def heading(self) -> str:
@@ -333,6 +340,15 @@ METRICS: tuple[Metric, ...] = (
     ),
 )
 BY_NAME: Mapping[str, Metric] = {metric.name: metric for metric in METRICS}
+
+
+def metric_named(name: str) -> Metric:
+    """A metric of METRICS.
+
+    Raises:
+        KeyError: There is no such metric.
+    """
+    return BY_NAME[name]
 
 
 def measure(
