@@ -160,8 +160,8 @@ def test_what_extract_would_take_follows_the_users_choice(inspect, navirl, tmp_p
     assert view["roles"]["wrench"] == {"topics": ["/other_wrench"], "reason": "named by `topic`", "problem": None}
     error = navirl("inspect", path, "--topic", "wrench=/odom", code=1).stderr
     assert error == (
-        "navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, found "
-        "nav_msgs/Odometry\n"
+        "navirl: run.mcap: --topic wrench: expected a topic of type geometry_msgs/WrenchStamped or "
+        "geometry_msgs/Wrench, found '/odom' of type nav_msgs/Odometry\n"
     )
 
 
@@ -373,7 +373,7 @@ def test_what_is_no_log(navirl, tmp_path):
     error = navirl("inspect", tmp_path / "none.mcap", code=1).stderr
     assert "none.mcap" in error
     assert error.count("\n") == 1
-    assert "Missing argument 'LOGS" in navirl("inspect", code=2).stderr
+    assert "Missing argument 'LOG..." in navirl("inspect", code=2).stderr
 
 
 def test_a_time_that_is_not_a_date(inspect, navirl, tmp_path):

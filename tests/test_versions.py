@@ -18,7 +18,7 @@ RENAMED = {
     "demonstrations": ("peak_n", "impulse_ns", "m_s_per_n", "standard_error"),
     "reward": ("told", "per_step"),
     "metrics": ("less", "lower", "p_value"),
-    "study": (),
+    "study": ("trouble", "asked", "lower", "upper", "against"),
 }
 
 

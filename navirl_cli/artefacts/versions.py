@@ -20,10 +20,25 @@ def _at(value: Any, way: list[str]) -> Iterator[Any]:
         yield from _at(one, way[1:])
 
 
+def _objects(document: Any, way: list[str]) -> Iterator[dict[str, Any]]:
+    """All objects at a place."""
+    return (one for one in _at(document, way) if isinstance(one, dict))
+
+
 def _names(document: dict[str, Any]) -> list[str]:
     """Which metrics a metrics file of version 1 holds."""
-    means = (one for one in _at(document, ["groups", "*", "mean"]) if isinstance(one, dict))
-    return list(next(means, ()))
+    return list(next(_objects(document, ["groups", "*", "mean"]), ()))
+
+
+def _object(parent: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """An object of a parent; an empty one where something else stands, which the check finds."""
+    value = parent.get(name)
+    return value if isinstance(value, dict) else {}
+
+
+def _participant(demonstration: Mapping[str, Any]) -> str:
+    """The participant of an id, as extract names demonstrations."""
+    return str(demonstration.get("id")).rpartition("/")[0]
 
 
 #: Metrics that have another name since version 1, wherever values stand by metric.
@@ -58,7 +73,19 @@ _RENAMED: Mapping[str, Mapping[str, str]] = {
         "pairs/*/metrics/*/p_value": "wilcoxon_p",
         **{f"{place}/{old}": new for place in _BY_METRIC for old, new in _METRICS.items()},
     },
+    "study": {
+        "participants/*/trouble": "problems",
+        "pooled/trouble": "problems",
+        "metrics/*/paths": "count",
+        "claims/*/asked": "question",
+        "claims/*/differences/*/of": "quantity",
+        "claims/*/differences/*/lower": "student_lower",
+        "claims/*/differences/*/upper": "student_upper",
+        "claims/*/differences/*/against": "participants_against",
+    },
 }
+#: By kind and place: fields of version 1 that stand in an object beside them since.
+_MOVED: Mapping[str, Mapping[str, Mapping[str, str]]] = {"study": {"demonstrations/*": {"onset_m": "metrics"}}}
 #: By kind and place: fields that version 1 does not have, and what they would be.
 _ADDED: Mapping[str, Mapping[str, Mapping[str, Callable[[Any], Any]]]] = {
     "metrics": {
@@ -68,12 +95,29 @@ _ADDED: Mapping[str, Mapping[str, Mapping[str, Callable[[Any], Any]]]] = {
         },
         "groups/*": {"missing": lambda _: {}},
         "demonstrations/*": {
-            "participant": lambda one: str(one.get("id")).rpartition("/")[0],  # as extract names demonstrations
+            "participant": _participant,
             "missing": lambda _: {},
         },
         "pairs/*/metrics/*": {"student_lower": lambda _: None, "student_upper": lambda _: None},
     },
+    "study": {
+        "metrics/*": {"missing": lambda _: {}, "missing_on_grid": lambda _: {}},
+        "claims/*/differences/*": {"n": lambda one: len(_object(one, "by_participant"))},
+        "demonstrations/*": {
+            "participant": _participant,
+            "missing": lambda _: {},
+            "missing_on_grid": lambda _: {},
+        },
+    },
 }
+
+
+def _rename(document: dict[str, Any], place: list[str], name: str) -> None:
+    """Give a field another name."""
+    *way, old = place
+    for parent in _objects(document, way):
+        if old in parent and name not in parent:
+            parent[name] = parent.pop(old)
 
 
 def is_known(version: object) -> bool:
@@ -95,13 +139,14 @@ def upgraded(document: dict[str, Any], kind: str) -> dict[str, Any]:
     if document["version"] == VERSION:
         return document
     for place, name in _RENAMED.get(kind, {}).items():
-        *way, old = place.split("/")
-        for parent in _at(document, way):
-            if isinstance(parent, dict) and old in parent and name not in parent:
-                parent[name] = parent.pop(old)
+        _rename(document, place.split("/"), name)
+    for place, moved in _MOVED.get(kind, {}).items():
+        for parent in _objects(document, place.split("/")):
+            for name in moved.keys() & parent.keys():
+                if isinstance(target := parent.get(moved[name]), dict):
+                    target[name] = parent.pop(name)
     for place, fields in _ADDED.get(kind, {}).items():
-        for parent in _at(document, place.split("/") if place else []):
-            if isinstance(parent, dict):
-                parent |= {name: value(parent) for name, value in fields.items() if name not in parent}
+        for parent in _objects(document, place.split("/") if place else []):
+            parent |= {name: value(parent) for name, value in fields.items() if name not in parent}
     document["version"] = VERSION
     return document
