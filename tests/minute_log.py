@@ -58,8 +58,8 @@ OPTIONS = {
     "unchunked, no summary": {"use_chunking": False, **BARE},
 }
 #: The ends of many reasons.
-CUT = "the messages before the cut were read, those behind it are lost"
-BEHIND = "what stands behind it is lost"
+CUT = "the messages before the cut were read, those after it are lost"
+BEHIND = "everything after it is lost"
 
 
 class Log:

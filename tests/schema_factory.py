@@ -1,4 +1,4 @@
-"""Random message types and messages, with a slow encoder that follows the wire formats' text word by word."""
+"""Random message types and messages, with a slow encoder that follows the text of the wire formats."""
 
 import math
 import struct
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-#: Python's and numpy's own words, and plain ones.
+#: Names of fields: words of Python and numpy, and others.
 NAMES = (
     *("class", "def", "None", "lambda", "import", "self", "cls", "values", "pos", "len", "int", "numpy"),
     *("dtype", "shape", "itemsize", "names", "fields", "strides", "data", "base", "f0", "T", "x", "sec", "a_b2"),
@@ -35,45 +35,45 @@ TEXTS = ("", "a", "odom", "ft sensor", "ü", "\U0001f600!", "n\0l", "x" * 40)
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A field's type: a primitive's name, "string", "time", "duration" or a message's fields; one, or many."""
+class FieldType:
+    """The type of a field: a primitive's name, "string", "time", "duration" or a message's fields; one or many."""
 
-    what: "str | tuple[tuple[str, Kind], ...]"
+    what: "str | tuple[tuple[str, FieldType], ...]"
     #: "" for one, "[]" for a sequence, "[3]" for an array of three.
     many: str = ""
 
     @property
-    def one(self) -> "Kind":
-        return Kind(self.what)
+    def one(self) -> "FieldType":
+        return FieldType(self.what)
 
 
-def kinds(depth: int) -> st.SearchStrategy[Kind]:
-    """Types of fields; messages without fields stand in arrays only, since any number of them fits into ROS 1."""
+def field_types(depth: int) -> st.SearchStrategy[FieldType]:
+    """Types of fields. Messages without fields are in fixed arrays only: in ROS 1 they take no bytes."""
     plain = st.sampled_from([*PRIMITIVES, "string", "string", "time", "duration"])
-    some = st.builds(Kind, plain | messages(depth - 1) if depth else plain, st.sampled_from(MANY))
-    return some | st.just(Kind((), "[3]"))
+    some = st.builds(FieldType, plain | messages(depth - 1) if depth else plain, st.sampled_from(MANY))
+    return some | st.just(FieldType((), "[3]"))
 
 
-def messages(depth: int) -> st.SearchStrategy[tuple[tuple[str, Kind], ...]]:
-    """Fields of a message that holds others up to a depth."""
-    named = st.tuples(st.sampled_from(NAMES), kinds(depth))
+def messages(depth: int) -> st.SearchStrategy[tuple[tuple[str, FieldType], ...]]:
+    """The fields of a message that contains other messages up to a depth."""
+    named = st.tuples(st.sampled_from(NAMES), field_types(depth))
     fields = st.lists(named, min_size=1, max_size=5, unique_by=lambda pair: pair[0]).map(tuple)
-    return fields.filter(lambda fields: any(kind.what != () for _, kind in fields))
+    return fields.filter(lambda fields: any(field_type.what != () for _, field_type in fields))
 
 
-def definition(fields: tuple[tuple[str, Kind], ...], ros: int) -> str:
-    """The type's text and those of the types in it, as recorders embed them."""
+def definition(fields: tuple[tuple[str, FieldType], ...], ros: int) -> str:
+    """The definition of a type and those of the types in it, as recorders embed them."""
     texts: list[str] = []
 
-    def write(fields: tuple[tuple[str, Kind], ...]) -> int:
+    def write(fields: tuple[tuple[str, FieldType], ...]) -> int:
         place = len(texts)
         texts.append("")
         lines = []
-        for name, kind in fields:
-            word = kind.what if isinstance(kind.what, str) else f"t_msgs/M{write(kind.what)}"
+        for name, field_type in fields:
+            word = field_type.what if isinstance(field_type.what, str) else f"t_msgs/M{write(field_type.what)}"
             if ros == 2 and word in {"time", "duration"}:
                 word = f"builtin_interfaces/{word.capitalize()}"
-            lines.append(f"{word}{kind.many} {name}\n")
+            lines.append(f"{word}{field_type.many} {name}\n")
         texts[place] = "".join(lines)
         return place
 
@@ -85,25 +85,25 @@ def pick(rng: np.random.Generator, options: Sequence[Any]) -> Any:
     return options[rng.integers(len(options))]
 
 
-def value(kind: Kind, lengths: np.random.Generator, values: np.random.Generator) -> Any:
+def value(field_type: FieldType, lengths: np.random.Generator, values: np.random.Generator) -> Any:
     """A value: a number, a text, a pair for a time, a dict for a message, a list for many.
 
-    What has a length takes it from `lengths`, so that messages can share their layout and differ in values.
+    All lengths are drawn from `lengths`, so that messages can share their layout and differ in their values.
     """
-    if kind.many:
-        count = int(kind.many[1:-1] or pick(lengths, (0, 0, 1, 2, 5)))
-        return [value(kind.one, lengths, values) for _ in range(count)]
-    if not isinstance(kind.what, str):
-        return {name: value(one, lengths, values) for name, one in kind.what}
-    if kind.what == "string":
+    if field_type.many:
+        count = int(field_type.many[1:-1] or pick(lengths, (0, 0, 1, 2, 5)))
+        return [value(field_type.one, lengths, values) for _ in range(count)]
+    if not isinstance(field_type.what, str):
+        return {name: value(one, lengths, values) for name, one in field_type.what}
+    if field_type.what == "string":
         return "".join(pick(values, "abc") if letter == "x" else letter for letter in pick(lengths, TEXTS))
-    if kind.what in {"time", "duration"}:
+    if field_type.what in {"time", "duration"}:
         return pick(values, (-(2**31), -1, 0, 928, 2**31 - 1)), pick(values, (0, 1, 999_999_999))
-    return number(np.dtype(PRIMITIVES[kind.what][1]), values)
+    return number(np.dtype(PRIMITIVES[field_type.what][1]), values)
 
 
 def number(dtype: np.dtype[Any], rng: np.random.Generator) -> Any:
-    """A number, often one of the edges."""
+    """A number, often one of the limits of its type."""
     if dtype.kind == "b":
         return pick(rng, (False, True))
     if dtype.kind == "f":
@@ -121,7 +121,7 @@ class Wire:
     encoding: str
     order: str = "<"
 
-    def payload(self, fields: tuple[tuple[str, Kind], ...], message: dict[str, Any]) -> bytes:
+    def payload(self, fields: tuple[tuple[str, FieldType], ...], message: dict[str, Any]) -> bytes:
         self.out = bytearray()
         self._message(fields, message)
         head = {"<": b"\0\1\0\0", ">": b"\0\0\0\0"}[self.order] if self.encoding == "cdr" else b""
@@ -134,52 +134,54 @@ class Wire:
             self.out += bytes(-len(self.out) % size)
         self.out += struct.pack(self.order + letter, number)
 
-    def _message(self, fields: tuple[tuple[str, Kind], ...], message: dict[str, Any]) -> None:
-        for name, kind in fields:
-            self._value(kind, message[name])
+    def _message(self, fields: tuple[tuple[str, FieldType], ...], message: dict[str, Any]) -> None:
+        for name, field_type in fields:
+            self._value(field_type, message[name])
         if not fields and self.encoding == "cdr":
-            # IDL has no empty struct: ROS 2 gives it a byte
+            # IDL has no empty struct: in ROS 2 it has a byte
             self._number("B", 0)
 
-    def _value(self, kind: Kind, value: Any) -> None:
-        if kind.many:
-            if kind.many == "[]":
+    def _value(self, field_type: FieldType, value: Any) -> None:
+        if field_type.many:
+            if field_type.many == "[]":
                 self._number("I", len(value))
             for one in value:
-                self._value(kind.one, one)
-        elif not isinstance(kind.what, str):
-            self._message(kind.what, value)
-        elif kind.what == "string":
+                self._value(field_type.one, one)
+        elif not isinstance(field_type.what, str):
+            self._message(field_type.what, value)
+        elif field_type.what == "string":
             data = value.encode() + (b"\0" if self.encoding == "cdr" else b"")
             self._number("I", len(data))
             self.out += data
-        elif kind.what in {"time", "duration"}:
+        elif field_type.what in {"time", "duration"}:
             self._number("i", value[0])
             self._number("I", value[1])
         else:
-            self._number(PRIMITIVES[kind.what][0], value)
+            self._number(PRIMITIVES[field_type.what][0], value)
 
 
-def columns(fields: tuple[tuple[str, Kind], ...], prefix: str = "", many: str = "") -> Iterator[tuple[str, str, Kind]]:
-    """Every path that can be a column, the sequence it is in (or ""), and its kind."""
-    for name, kind in fields:
+def columns(
+    fields: tuple[tuple[str, FieldType], ...], prefix: str = "", many: str = ""
+) -> Iterator[tuple[str, str, FieldType]]:
+    """Every path that can be a column, the sequence that holds it (or ""), and its type."""
+    for name, field_type in fields:
         path = prefix + name
-        if isinstance(kind.what, str) and not kind.many:
-            yield path, many, kind
-            if kind.what in {"time", "duration"}:
-                yield f"{path}.sec", many, Kind("int32")
-                yield f"{path}.nanosec", many, Kind("uint32")
-        if not isinstance(kind.what, str) and not (kind.many and many):
-            entries = f"{path}[]" if kind.many else ""
-            yield from columns(kind.what, (entries or path) + ".", many or entries)
-        if isinstance(kind.what, str) and kind.many and not many:
-            yield f"{path}[]", f"{path}[]", kind.one
-            if kind.many != "[]" and kind.what in PRIMITIVES:
-                yield path, "", kind
+        if isinstance(field_type.what, str) and not field_type.many:
+            yield path, many, field_type
+            if field_type.what in {"time", "duration"}:
+                yield f"{path}.sec", many, FieldType("int32")
+                yield f"{path}.nanosec", many, FieldType("uint32")
+        if not isinstance(field_type.what, str) and not (field_type.many and many):
+            entries = f"{path}[]" if field_type.many else ""
+            yield from columns(field_type.what, (entries or path) + ".", many or entries)
+        if isinstance(field_type.what, str) and field_type.many and not many:
+            yield f"{path}[]", f"{path}[]", field_type.one
+            if field_type.many != "[]" and field_type.what in PRIMITIVES:
+                yield path, "", field_type
 
 
 def entries(message: dict[str, Any], path: str) -> list[Any]:
-    """The values of a column in one message; a time's as a pair."""
+    """The values of a column in one message; a time is a pair."""
     found: list[Any] = [message]
     for part in path.split("."):
         name = part.removesuffix("[]")
@@ -189,15 +191,15 @@ def entries(message: dict[str, Any], path: str) -> list[Any]:
     return found
 
 
-def expected(batch: list[dict[str, Any]], path: str, sequence: str, kind: Kind) -> tuple[Any, Any]:
-    """A column of messages, and the number of entries of each (None where the path is in no sequence)."""
+def expected(batch: list[dict[str, Any]], path: str, sequence: str, field_type: FieldType) -> tuple[Any, Any]:
+    """A column of messages, and the number of entries of each; None if the path is in no sequence."""
     found = [entries(message, path) for message in batch]
     flat = [one for many in found for one in many]
-    if kind.what in {"time", "duration"}:
+    if field_type.what in {"time", "duration"}:
         column = np.array([sec * 10**9 + nanosec for sec, nanosec in flat], dtype=np.int64)
-    elif kind.what == "string":
+    elif field_type.what == "string":
         column = np.array([*flat, None], dtype=object)[:-1]
     else:
-        shape = (len(flat), int(kind.many[1:-1])) if kind.many else (len(flat),)
-        column = np.array(flat, dtype=PRIMITIVES[str(kind.what)][1]).reshape(shape)
+        shape = (len(flat), int(field_type.many[1:-1])) if field_type.many else (len(flat),)
+        column = np.array(flat, dtype=PRIMITIVES[str(field_type.what)][1]).reshape(shape)
     return column, np.array([len(many) for many in found]) if sequence else None

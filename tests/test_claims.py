@@ -66,10 +66,11 @@ CLAIMS = {
         field="wrench.force.w",
     ),
     "no column": Claim(
-        "'wrench.force' is no number, text, time or fixed array of numbers; its messages are lost", field="wrench.force"
+        "'wrench.force' is not a number, text, time or fixed array of numbers; its messages are lost",
+        field="wrench.force",
     ),
     "below a column": Claim(
-        "'y' in 'wrench.force.x.y' lies below a field that is no single message; its messages are lost",
+        "'y' in 'wrench.force.x.y' is below a field that is not a single message; its messages are lost",
         field="wrench.force.x.y",
     ),
     "cdr that is json": Claim(
@@ -96,7 +97,7 @@ CLAIMS = {
         tried=True,
     ),
     "json that is cdr": Claim(
-        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(no JSON: ",
+        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(not JSON: ",
         schema=("jsonschema", "{}"),
         encoding="json",
         tried=True,
@@ -137,7 +138,7 @@ def test_of_two_types_on_one_topic_the_first_is_read(tmp_path):
     (note,) = result.damage
     assert note.reason == (
         "topic /x: expected geometry_msgs/msg/WrenchStamped, as in its other channels, found nav_msgs/msg/Odometry, "
-        "which is left out"
+        "which is ignored"
     )
 
 

@@ -197,7 +197,7 @@ def test_a_missing_log_among_good_ones_and_a_log_given_twice(navirl, tmp_path):
     copy = tmp_path / "copy.mcap"
     copy.write_bytes(good.read_bytes())
     stderr = navirl("extract", good, "none.mcap", copy, "-o", "demos.json", code=3).stderr
-    assert "left out: none.mcap: expected an MCAP file, found nothing there" in stderr
+    assert "left out: none.mcap: expected an MCAP file, found no file there" in stderr
     assert "copy.mcap: the same recording as run.mcap" in stderr
     document = read_json(Path("demos.json"), "demonstrations")
     assert [source["file"] for source in document["inputs"]] == ["run.mcap"]

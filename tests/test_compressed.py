@@ -1,3 +1,5 @@
+"""Whole-file compression: every variant is read, and what is left of a damaged file."""
+
 import os
 import re
 import struct
@@ -19,10 +21,10 @@ SKIPPED = b"\x52\x2a\x4d\x18" + struct.pack("<I", 5) + b"12345"
 
 
 def content(size=1_000_000, seed=5):
-    """MCAP's magic and bytes of which some compress and some do not."""
+    """MCAP's magic, then bytes of which some compress and some do not."""
     rng = np.random.default_rng(seed)
     noise = rng.integers(0, 256, size, dtype=np.uint8)
-    # blocks of zstd of all kinds: compressed, as they are, one byte repeated
+    # all types of zstd blocks: compressed, stored, one byte repeated
     noise[: size // 3] &= 0x0F
     noise[size // 2 : size // 2 + 3 * BLOCK] = 7
     return MAGIC + noise.tobytes()[: size - len(MAGIC)]
@@ -33,12 +35,12 @@ def zstd(data, **options):
 
 
 def zstd_stream(data, **options):
-    """Without the content's size, as a pipe writes it."""
+    """A frame without the content's size, as written to a pipe."""
     compressor = zstandard.ZstdCompressor(**options).compressobj()
     return compressor.compress(data) + compressor.flush()
 
 
-WAYS = {
+VARIANTS = {
     "zstd": zstd,
     "zstd with a checksum": lambda data: zstd(data, write_checksum=True),
     "zstd without content size": zstd_stream,
@@ -55,32 +57,32 @@ WAYS = {
 }
 
 
-def read(opened):
+def read(raw):
     """All bytes, by the file's own reading and by its descriptor."""
-    with opened.file as file:
+    with raw.file as file:
         data = file.read()
-        assert os.pread(file.fileno(), opened.size + 9, 0) == data
-    assert len(data) == opened.size
+        assert os.pread(file.fileno(), raw.size + 9, 0) == data
+    assert len(data) == raw.size
     return data
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", ["log.mcap", "log.mcap.zstd", "log"])
-def test_what_is_compressed_as_a_whole_is_read(tmp_path, way, name):
+def test_compressed_files_are_read(tmp_path, variant, name):
     data = content()
     path = tmp_path / name
-    path.write_bytes(WAYS[way](data))
-    opened = open_log(path)
-    assert opened.damage == ()
-    assert read(opened) == data
+    path.write_bytes(VARIANTS[variant](data))
+    raw = open_log(path)
+    assert raw.damage == ()
+    assert read(raw) == data
 
 
-def test_what_is_not_compressed_is_opened_itself(tmp_path):
+def test_a_plain_file_is_opened_itself(tmp_path):
     path = forge.forge(tmp_path / "log.mcap.zstd", forge.run(50))
-    opened = open_log(path)
-    assert os.path.samestat(os.fstat(opened.file.fileno()), path.stat())
-    assert opened.damage == ()
-    assert read(opened) == path.read_bytes()
+    raw = open_log(path)
+    assert os.path.samestat(os.fstat(raw.file.fileno()), path.stat())
+    assert raw.damage == ()
+    assert read(raw) == path.read_bytes()
 
 
 def zstd_blocks(blob):
@@ -104,24 +106,24 @@ def test_a_cut_zstd_file_keeps_every_block_before_the_cut(tmp_path):
     path = tmp_path / "log.mcap.zstd"
     for number, cut in ((1, starts[1]), (3, starts[3] + 2), (4, starts[5] - 1), (5, starts[5] + 40)):
         path.write_bytes(blob[:cut])
-        opened = open_log(path)
-        found = read(opened)
+        raw = open_log(path)
+        found = read(raw)
         assert found == data[: len(found)]
-        # of a block that is stored as it is the bytes before the cut are there too
+        # of a stored block the bytes before the cut are read, too
         assert sizes[number] <= len(found) < sizes[number + 1]
-        (damage,) = opened.damage
+        (damage,) = raw.damage
         assert (damage.path, damage.start, damage.stop) == (path, starts[number], cut)
-        assert damage.reason == "the zstd compression is cut; what stood behind is lost, what stands before is read"
+        assert damage.reason == "the zstd data are cut off; everything before was read, the rest is lost"
 
 
-def test_a_cut_inside_of_a_stored_block_keeps_its_start(tmp_path):
+def test_a_cut_inside_a_stored_block_keeps_its_start(tmp_path):
     data = MAGIC + np.random.default_rng(1).bytes(300_000)
     blob = zstd(data)
     path = tmp_path / "log.mcap.zstd"
     path.write_bytes(blob[:200_000])
-    opened = open_log(path)
-    assert 199_900 < opened.size < 200_000
-    assert read(opened) == data[: opened.size]
+    raw = open_log(path)
+    assert 199_900 < raw.size < 200_000
+    assert read(raw) == data[: raw.size]
 
 
 def lz4_blocks(blob):
@@ -140,13 +142,13 @@ def test_a_cut_lz4_file_keeps_every_block_before_the_cut(tmp_path):
     path = tmp_path / "log.mcap.lz4"
     for number, cut in ((1, starts[1]), (3, starts[3] + 2), (4, starts[5] - 1), (len(starts) - 1, len(blob) - 1)):
         path.write_bytes(blob[:cut])
-        opened = open_log(path)
-        found = read(opened)
+        raw = open_log(path)
+        found = read(raw)
         assert found == data[: len(found)]
         assert min(number * 65536, len(data)) <= len(found) < (number + 1) * 65536
-        (damage,) = opened.damage
+        (damage,) = raw.damage
         assert (damage.start, damage.stop) == (starts[number], cut)
-        assert damage.reason == "the lz4 compression is cut; what stood behind is lost, what stands before is read"
+        assert damage.reason == "the lz4 data are cut off; everything before was read, the rest is lost"
 
 
 def test_a_damaged_zstd_block_ends_what_is_kept(tmp_path):
@@ -156,12 +158,12 @@ def test_a_damaged_zstd_block_ends_what_is_kept(tmp_path):
     path = tmp_path / "log.mcap.zstd"
     path.write_bytes(blob)
     forge.overwrite(path, starts[2] + 3, b"\xff" * 20)
-    opened = open_log(path)
-    assert read(opened) == data[: 2 * BLOCK]
-    (damage,) = opened.damage
+    raw = open_log(path)
+    assert read(raw) == data[: 2 * BLOCK]
+    (damage,) = raw.damage
     assert (damage.start, damage.stop) == (starts[2], len(blob))
-    assert re.fullmatch(r"the zstd compression is damaged \(.*\); what stands here and behind is lost", damage.reason)
-    assert str(damage).startswith(f"{path}: bytes {starts[2]} to {len(blob)}: the zstd compression is damaged")
+    assert re.fullmatch(r"the zstd data are damaged \(.*\); the rest is lost", damage.reason)
+    assert str(damage).startswith(f"{path}: bytes {starts[2]} to {len(blob)}: the zstd data are damaged")
 
 
 def test_a_damaged_lz4_block_ends_what_is_kept(tmp_path):
@@ -170,23 +172,23 @@ def test_a_damaged_lz4_block_ends_what_is_kept(tmp_path):
     path = tmp_path / "log.mcap.lz4"
     path.write_bytes(blob)
     forge.overwrite(path, len(blob) // 2, b"\xff" * 20)
-    opened = open_log(path)
-    assert 4 * 65536 <= opened.size < len(data) // 65536 * 65536
-    assert read(opened) == data[: opened.size]
-    (damage,) = opened.damage
+    raw = open_log(path)
+    assert 4 * 65536 <= raw.size < len(data) // 65536 * 65536
+    assert read(raw) == data[: raw.size]
+    (damage,) = raw.damage
     assert damage.start < len(blob) // 2 < damage.stop == len(blob)
-    assert re.fullmatch(r"the lz4 compression is damaged \(.*\); what stands here and behind is lost", damage.reason)
-    # a length that no block can have is not believed
+    assert re.fullmatch(r"the lz4 data are damaged \(.*\); the rest is lost", damage.reason)
+    # a length that no block can have is refused
     first = 15
     forge.overwrite(path, first, b"\xff\xff\xff\x7f")
-    with pytest.raises(LogError, match=r"the lz4 compression is damaged \(a block of 2147483647 bytes\)"):
+    with pytest.raises(LogError, match=r"the lz4 data are damaged \(a block of 2147483647 bytes\)"):
         open_log(path)
 
 
-@pytest.mark.parametrize("kind", ["zstd", "lz4"])
-def test_a_wrong_checksum_is_told_and_the_next_frame_is_read(tmp_path, kind):
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_wrong_checksum_is_reported_and_the_next_frame_is_read(tmp_path, compression):
     data = content()
-    if kind == "zstd":
+    if compression == "zstd":
         frame = zstd(data[:500_000], write_checksum=True)
         following = zstd(data[500_000:])
     else:
@@ -195,34 +197,32 @@ def test_a_wrong_checksum_is_told_and_the_next_frame_is_read(tmp_path, kind):
     path = tmp_path / "log.mcap"
     path.write_bytes(frame + following)
     forge.overwrite(path, len(frame) - 4, b"abcd")
-    opened = open_log(path)
-    assert read(opened) == data
-    (damage,) = opened.damage
+    raw = open_log(path)
+    assert read(raw) == data
+    (damage,) = raw.damage
     assert (damage.start, damage.stop) == (0, len(frame))
-    assert damage.reason == (
-        f"the {kind} checksum is wrong; some of what it decompresses to is damaged, not known where"
-    )
+    assert damage.reason == (f"the {compression} checksum is wrong; some decompressed bytes are wrong, unknown which")
 
 
 @pytest.mark.parametrize(
     ("rest", "reason"),
     [
-        (bytes(100), "no zstd frame starts here (00 00 00 00); what stands here is lost"),
-        (b"ab", "no zstd frame starts here (61 62); what stands here is lost"),
-        (b"\x28\xb5\x2f\xfd", "the zstd compression is cut; what stood behind is lost, what stands before is read"),
-        (SKIPPED[:-1], "the file ends inside a frame that holds no data; what stood behind is lost"),
-        (SKIPPED[:6], "the file ends inside a frame that holds no data; what stood behind is lost"),
-        (b"\x28\xb5\x2f\xfd" + b"\xff" * 30, "the zstd compression is damaged ("),
+        (bytes(100), "no zstd frame starts here (00 00 00 00); the rest is lost"),
+        (b"ab", "no zstd frame starts here (61 62); the rest is lost"),
+        (b"\x28\xb5\x2f\xfd", "the zstd data are cut off; everything before was read, the rest is lost"),
+        (SKIPPED[:-1], "the file ends inside a skippable frame; the rest is lost"),
+        (SKIPPED[:6], "the file ends inside a skippable frame; the rest is lost"),
+        (b"\x28\xb5\x2f\xfd" + b"\xff" * 30, "the zstd data are damaged ("),
     ],
 )
-def test_what_stands_behind_the_frames_is_told(tmp_path, rest, reason):
+def test_bytes_after_the_frames_are_reported(tmp_path, rest, reason):
     data = content()
     blob = zstd(data)
     path = tmp_path / "log.mcap.zstd"
     path.write_bytes(blob + rest)
-    opened = open_log(path)
-    assert read(opened) == data
-    (damage,) = opened.damage
+    raw = open_log(path)
+    assert read(raw) == data
+    (damage,) = raw.damage
     assert (damage.start, damage.stop) == (len(blob), len(blob) + len(rest))
     assert damage.reason.startswith(reason)
 
@@ -230,10 +230,10 @@ def test_what_stands_behind_the_frames_is_told(tmp_path, rest, reason):
 @pytest.mark.parametrize(
     ("blob", "message"),
     [
-        (zstd(content())[:20], "expected MCAP compressed with zstd, found: the zstd compression is cut"),
-        (lz4.frame.compress(content())[:5], "expected MCAP compressed with lz4, found: the lz4 compression is cut"),
-        (b"\x04\x22\x4d\x18" + bytes(99), "expected MCAP compressed with lz4, found: the lz4 compression is damaged ("),
-        (SKIPPED, "expected an MCAP file inside of its zstd compression, found an empty file; record or copy it again"),
+        (zstd(content())[:20], "expected MCAP compressed with zstd, found: the zstd data are cut off"),
+        (lz4.frame.compress(content())[:5], "expected MCAP compressed with lz4, found: the lz4 data are cut off"),
+        (b"\x04\x22\x4d\x18" + bytes(99), "expected MCAP compressed with lz4, found: the lz4 data are damaged ("),
+        (SKIPPED, "expected an MCAP file inside the zstd compression, found an empty file; record or copy it again"),
         (SKIPPED + b"hello", "expected MCAP compressed with zstd, found: no zstd frame starts here (68 65 6c 6c)"),
     ],
 )
@@ -245,7 +245,7 @@ def test_a_file_of_which_nothing_decompresses_is_refused(tmp_path, blob, message
     assert str(caught.value).endswith("copy it again")
 
 
-def test_a_window_that_fills_the_memory_is_refused(tmp_path):
+def test_a_window_that_would_fill_the_memory_is_refused(tmp_path):
     path = tmp_path / "log.mcap.zstd"
     for log, fits in ((27, True), (28, False)):
         options = zstandard.ZstdCompressionParameters(window_log=log)
@@ -261,7 +261,7 @@ def test_a_window_that_fills_the_memory_is_refused(tmp_path):
             open_log(path)
 
 
-def test_much_that_decompresses_from_little_goes_by_without_much_memory(tmp_path, monkeypatch):
+def test_memory_is_bounded_if_few_bytes_decompress_to_many(tmp_path, monkeypatch):
     sizes = []
     real = tempfile.TemporaryFile
 
@@ -274,9 +274,9 @@ def test_much_that_decompresses_from_little_goes_by_without_much_memory(tmp_path
     path = tmp_path / "log.mcap.zstd"
     path.write_bytes(zstd(MAGIC + bytes(50_000_000)))
     assert path.stat().st_size < 10_000
-    opened = open_log(path)
-    opened.file.close()
-    assert opened.size == 50_000_008
+    raw = open_log(path)
+    raw.file.close()
+    assert raw.size == 50_000_008
     assert max(sizes) == BLOCK
 
 
@@ -292,19 +292,20 @@ def test_a_full_disk_and_a_missing_temporary_folder_are_named(tmp_path, monkeypa
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
     with pytest.raises(
         LogError,
-        match=rf"log.mcap.zstd: expected room in {tmp_path}/none for what it decompresses to, found: No such file or "
-        "directory after 0 bytes; free some, or name another folder in the environment variable TMPDIR",
+        match=rf"log.mcap.zstd: expected free space in {tmp_path}/none for the decompressed file, found: No such "
+        "file or directory after 0 bytes; free some space, or name another folder in the environment variable TMPDIR",
     ):
         open_log(path)
     monkeypatch.setattr(tempfile, "tempdir", "/elsewhere")
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda: open("/dev/full", "w+b"))  # noqa: PTH123, SIM115
     with pytest.raises(
-        LogError, match=r"expected room in /elsewhere for .* found: No space left on device after \d+ bytes; free some"
+        LogError,
+        match=r"expected free space in /elsewhere for .* found: No space left on device after \d+ bytes; free some",
     ):
         open_log(path)
 
 
-def test_a_file_that_may_not_be_read(tmp_path, monkeypatch):
+def test_a_file_without_permission_to_read(tmp_path, monkeypatch):
     path = forge.forge(tmp_path / "log.mcap", forge.run(50))
 
     def refuse(*_):
@@ -317,7 +318,7 @@ def test_a_file_that_may_not_be_read(tmp_path, monkeypatch):
         open_log(path)
 
 
-def test_a_disk_that_fails_while_it_is_read_is_not_taken_for_a_full_one(tmp_path, monkeypatch):
+def test_a_read_error_of_the_disk_is_not_reported_as_a_full_disk(tmp_path, monkeypatch):
     path = tmp_path / "log.mcap.zstd"
     blob = zstd(content())
     path.write_bytes(blob)
@@ -338,7 +339,7 @@ def test_a_disk_that_fails_while_it_is_read_is_not_taken_for_a_full_one(tmp_path
     monkeypatch.setattr(type(path), "open", failing)
     with pytest.raises(
         LogError,
-        match=rf"expected {len(blob)} readable bytes, found: Input/output error behind byte \d+; copy what can be read",
+        match=rf"expected {len(blob)} readable bytes, found: Input/output error after byte \d+; copy what can be read",
     ):
         open_log(path)
 
@@ -354,16 +355,16 @@ class Entered:
         self.close()
 
 
-def test_mutated_files_never_break_the_reading(tmp_path):
+def test_mutated_files_are_refused_or_read(tmp_path):
     rng = np.random.default_rng(3)
     data = content(60_000)
     path = tmp_path / "log.mcap.zstd"
-    silent = told = 0
+    silent = reported = 0
     for number in range(600):
-        way = list(WAYS)[number % len(WAYS)]
-        blob = bytearray(WAYS[way](data))
+        variant = list(VARIANTS)[number % len(VARIANTS)]
+        blob = bytearray(VARIANTS[variant](data))
         for _ in range(rng.integers(1, 4)):
-            # half of the changes hit the heads
+            # half of the changes hit the headers
             at = int(rng.integers(0, len(blob) if rng.random() < 0.5 else min(40, len(blob))))
             if rng.random() < 0.2:
                 del blob[at : at + int(rng.integers(1, 20))]
@@ -371,16 +372,16 @@ def test_mutated_files_never_break_the_reading(tmp_path):
                 blob[at] = rng.integers(0, 256)
         path.write_bytes(bytes(blob))
         try:
-            opened = open_log(path)
+            raw = open_log(path)
         except LogError as error:
             assert str(error).startswith(f"{path}: expected ")  # noqa: PT017
-            told += 1
+            reported += 1
             continue
-        found = read(opened)
-        told += bool(opened.damage)
-        if not opened.damage and "without" not in way:
-            # only a checksum tells of a changed byte in a block that is stored as it is, but its length stays
-            assert len(found) == len(data), (way, number)
+        found = read(raw)
+        reported += bool(raw.damage)
+        if not raw.damage and "without" not in variant:
+            # without a checksum, changed bytes in a stored block are not noticed, but its length stays
+            assert len(found) == len(data), (variant, number)
             silent += 1
-    assert told > 400
+    assert reported > 400
     assert silent > 40

@@ -1,4 +1,4 @@
-"""Files whose parts contradict each other: what is believed, and what is said."""
+"""Files whose records contradict each other: what is read, and what is reported."""
 
 import re
 import struct
@@ -18,38 +18,40 @@ def run(tmp_path):
 
 
 def records_of(path, code):
-    """Where the contents of a kind of record start in the file; its chunks are not looked into."""
+    """Where the contents of records of a type start in the file; chunks are not opened."""
     walked = strict_log.walk(path.read_bytes())
     return [record.start + records.HEAD_SIZE for record in walked.records if record.code == code]
 
 
-@pytest.mark.parametrize("way", ["zstd", "no statistics", "uncompressed chunks"])
-def test_a_chunk_of_zeros_is_no_empty_one(tmp_path, way):
-    path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS[way])
+@pytest.mark.parametrize("variant", ["zstd", "no statistics", "uncompressed chunks"])
+def test_a_chunk_of_zeros_is_not_an_empty_chunk(tmp_path, variant):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS[variant])
     (start, size), lost = forge.chunk_starts(path)[2], forge.messages_in_chunk(path, 2, "/wrench")
     before = wrenches_before(path, 2)
     forge.overwrite(path, start, bytes(size))
-    note, *others = damaged(path, [*range(before), *range(before + lost, 600)])
-    if way == "uncompressed chunks":
-        assert "zero bytes where a record should start" in note
-        assert f"600 messages of /wrench promised by the statistics, {600 - lost} are there" in others[0]
+    damage, *others = damaged(path, [*range(before), *range(before + lost, 600)])
+    if variant == "uncompressed chunks":
+        assert "zero bytes where a record should start" in damage
+        assert f"the statistics count 600 messages of /wrench, {600 - lost} were found" in others[0]
     else:
         assert others == []
-        assert re.search(rf"the chunk's head claims 0 bytes, expected {size - 49}; messages lost: {lost} of /w", note)
+        assert re.search(
+            rf"the chunk's header claims 0 bytes, expected {size - 49}; messages lost: {lost} of /w", damage
+        )
 
 
-def test_a_message_that_its_index_names_and_that_is_gone_is_told(tmp_path):
-    """One bit makes it a message of another channel; nothing but the index and the statistics knows better."""
+def test_a_missing_message_that_the_index_lists_is_reported(tmp_path):
+    """One bit makes it a message of another channel, which only the index and the statistics show."""
     path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS["uncompressed chunks"])
     data = path.read_bytes()
-    told = strict_log.walk(data).of("/wrench")[70]
-    forge.overwrite(path, data.index(told.record) + records.HEAD_SIZE, b"\3")
-    (note,) = damaged(path, [*range(70), *range(71, 600)])
-    assert re.search(r"(\d+) messages of /wrench in the chunk's message index, \d+ are there", note)
+    message = strict_log.walk(data).of("/wrench")[70]
+    forge.overwrite(path, data.index(message.record) + records.HEAD_SIZE, b"\3")
+    (damage,) = damaged(path, [*range(70), *range(71, 600)])
+    assert re.search(r"the chunk's message index lists \d+ messages of /wrench, \d+ were found", damage)
 
 
-def test_statistics_that_do_not_add_up_are_not_believed(run):
-    """The counts by channel may be left out, too."""
+def test_statistics_that_do_not_add_up_are_not_used(run):
+    """Recorders may also leave out the counts by channel."""
     at = records_of(run, records.STATISTICS)[0]
     forge.overwrite(without_summary_crc(run), at, struct.pack("<Q", 5000))
     contents = scan(run)
@@ -57,11 +59,11 @@ def test_statistics_that_do_not_add_up_are_not_believed(run):
     assert damaged(run, slice(None)) == []
 
 
-def test_chunks_that_stand_in_each_other_spoil_the_summary(run):
+def test_a_summary_with_overlapping_chunks_is_not_used(run):
     at = records_of(run, records.CHUNK_INDEX)[1]
     forge.overwrite(without_summary_crc(run), at + 24, struct.pack("<Q", 100_000))
-    (note,) = damaged(run, slice(None))
-    assert "the summary section is damaged and was not used; no message is lost" in note
+    (damage,) = damaged(run, slice(None))
+    assert "the summary section is damaged and was not used; no message is lost" in damage
 
 
 def test_a_file_without_the_record_that_ends_its_data(tmp_path):
@@ -71,9 +73,9 @@ def test_a_file_without_the_record_that_ends_its_data(tmp_path):
     path.write_bytes(data[: last.start] + data[-37:])
     result = read(path, {"/wrench": FIELDS})
     assert 400 < len(result.series["/wrench"]) < 600
-    (note,) = result.damage
-    assert (note.start, note.stop) == (last.start, last.start)
-    assert note.reason == "the record that ends the data is missing; messages may have stood before it"
+    (damage,) = result.damage
+    assert (damage.start, damage.stop) == (last.start, last.start)
+    assert damage.reason == "the record that ends the data is missing; messages before it may be missing, too"
 
 
 def test_names_that_cannot_be_printed_are_escaped(tmp_path):
@@ -102,7 +104,7 @@ def test_a_message_index_without_entries(run):
     data = run.read_bytes()
     at = records_of(run, records.MESSAGE_INDEX)[0]
     (size,) = struct.unpack_from("<I", data, at + 2)
-    # what is left of it becomes a record for private use
+    # the rest of it becomes a record for private use
     forge.overwrite(run, at - 8, struct.pack("<QHI", 6, *struct.unpack_from("<H", data, at), 0))
     forge.overwrite(run, at + 6, struct.pack("<BQ", records.PRIVATE, size - records.HEAD_SIZE))
     contents, times = message_times(run)
@@ -111,21 +113,21 @@ def test_a_message_index_without_entries(run):
     assert damaged(run, slice(None)) == []
 
 
-def test_a_summary_that_contradicts_the_chunks_is_told(tmp_path):
+def test_a_summary_that_contradicts_the_chunks_is_reported(tmp_path):
     path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS["uncompressed chunks"])
     at = path.read_bytes().rindex(b"/odom")
     forge.overwrite(path, at, b"/odor")
     result = read(path, {"/wrench": FIELDS, "/odom": ("header.stamp",)})
     assert "/odom" not in result.series
-    (note,) = result.damage
-    assert note.reason == (
-        "a schema or channel record cannot be used: channel 2 is defined as (2, '/odor', 'cdr') and as "
-        "(2, '/odom', 'cdr'); the first counts"
+    (damage,) = result.damage
+    assert damage.reason == (
+        "a schema or channel record cannot be used: channel 2 is defined twice, as (2, '/odor', 'cdr') and as "
+        "(2, '/odom', 'cdr'); the first definition is used"
     )
     kind = path.read_bytes().rindex(b"nav_msgs/msg/Odometry")
     forge.overwrite(forge.overwrite(path, at, b"/odom"), kind, b"nav_msgs/msg/Odometer")
-    (note,) = read(path, {"/odom": ("header.stamp",)}).damage
-    assert "schema 2 is defined in two ways, as 'nav_msgs/msg/Odometer' and 'nav_msgs/msg/Odometry'" in note.reason
+    (damage,) = read(path, {"/odom": ("header.stamp",)}).damage
+    assert "schema 2 is defined twice, as 'nav_msgs/msg/Odometer' and as 'nav_msgs/msg/Odometry'" in damage.reason
 
 
 def test_a_summary_with_channels_and_without_schemas(tmp_path):
@@ -134,8 +136,8 @@ def test_a_summary_with_channels_and_without_schemas(tmp_path):
     assert damaged(path, slice(None)) == []
 
 
-def test_times_tell_what_they_miss(run):
-    """Without a summary the chunks are opened, and what is wrong with them shows."""
+def test_message_times_report_what_they_miss(run):
+    """Without a summary the chunks are opened and checked."""
     start, _ = forge.chunk_starts(run)[2]
     lost = forge.messages_in_chunk(run, 2, "/wrench")
     forge.overwrite(run, start + records.HEAD_SIZE + 24, b"\1\2\3\4")
@@ -147,7 +149,7 @@ def test_times_tell_what_they_miss(run):
 
 
 def test_times_that_the_indexes_leave_out_are_found(run):
-    """The statistics know that some are missing."""
+    """The statistics show that some are missing."""
     data = run.read_bytes()
     at = next(at for at in records_of(run, records.MESSAGE_INDEX) if struct.unpack_from("<H", data, at) == (1,))
     forge.overwrite(run, at, b"\2")
@@ -155,11 +157,11 @@ def test_times_that_the_indexes_leave_out_are_found(run):
     assert damaged(run, slice(None)) == []
 
 
-def test_damage_is_told_in_the_order_of_the_file(run):
+def test_damage_is_reported_in_the_order_of_the_file(run):
     for number in (5, 1, 3):
         start, _ = forge.chunk_starts(run)[number]
         forge.overwrite(run, start + records.HEAD_SIZE + 24, b"\1\2\3\4")
     forge.cut(run, -20)
-    starts = [note.start for note in read(run, {"/wrench": FIELDS}, threads=4).damage]
+    starts = [damage.start for damage in read(run, {"/wrench": FIELDS}, threads=4).damage]
     assert len(starts) == 4
     assert starts == sorted(starts)

@@ -28,7 +28,7 @@ from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.messages.reader import message_times, read, scan
 
 S = 1_000_000_000
-ZEROS = rf"zero bytes where a record should start \(the power or the disk failed\); {BEHIND}"
+ZEROS = rf"zero bytes where a record should start \(power or disk failure\); {BEHIND}"
 
 
 @pytest.fixture
@@ -132,8 +132,8 @@ def test_zeros_from_within_a_chunk_that_is_not_compressed(path, variant):
     last = log.strict.messages[log.strict.messages.index(first) - 1]
     length = last.place.stop + chunk.stop - body(log, last).stop
     reason = (
-        f"no record starts at byte {first.place.start} of {length} of the uncompressed chunk; what stands up to byte "
-        f"{length} was read by its message index, or is lost"
+        f"no record starts at byte {first.place.start} of {length} of the uncompressed chunk; messages up to byte "
+        f"{length} were read by the message index, or are lost"
     )
     check(
         path,
@@ -190,7 +190,7 @@ def test_no_message_index(path):
     ("size", "message"),
     [
         (0, "expected an MCAP file, found an empty file; record or copy it again"),
-        (5, "expected an MCAP file, found its first 5 bytes only; nothing was recorded: record or copy it again"),
+        (5, "expected an MCAP file, found only its first 5 bytes; nothing was recorded: record or copy it again"),
         (8, r"expected an MCAP header after the magic, found the end of the file \(8 bytes\); nothing was recorded"),
         (
             12,
@@ -212,7 +212,7 @@ def test_only_the_magic_or_cut_in_the_header(path, size, message, use):
 def test_nothing_but_the_header(path):
     path.write_bytes(intact("zstd").data[: intact("zstd").chunks[0].start])
     (note,) = scan(path).damage
-    assert note.reason == "the file ends without its closing records; all that it holds was read"
+    assert note.reason == "the file ends without its closing records; everything in it was read"
     with pytest.raises(LogError, match=r"minute.mcap: holds no messages: the file ends before the first one; copy it"):
         load_recording(path)
 
@@ -239,7 +239,7 @@ def test_damage_is_dated_from_the_files_first_message_wherever_that_stands(path)
 
 
 def test_damage_is_listed_once_and_by_place(path):
-    known = Damage(path, 50, 60, "the zstd compression is cut")
+    known = Damage(path, 50, 60, "the zstd data are cut off")
     damage = DamageList(path, [known])
     damage.add(70, 80, "found first", (0, None))
     damage.add(10, 20, "found later", (1_500_000_000, 2_000_000_000))

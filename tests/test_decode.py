@@ -1,4 +1,4 @@
-"""Decoding: encodings and definitions of all kinds, and what does not decode."""
+"""Decoding: encodings, definitions, and payloads that do not decode."""
 
 import log_factory as forge
 import numpy as np
@@ -90,7 +90,7 @@ def idl(typename):
 def test_idl_as_rosbag2_stores_it(tmp_path, typename):
     messages, fields = SAMPLES[typename]
     log = [forge.Message("/t", typename, k, forge.cdr(message)) for k, message in enumerate(messages)]
-    # Joy for those who edit on Windows
+    # Joy with the line ends of Windows
     text = idl(typename).replace("\n", "\r\n" if typename == forge.JOY else "\n")
     check_same(forge.forge(tmp_path / "run.mcap", log, definitions={typename: ("ros2idl", text)}), fields)
 
@@ -118,7 +118,7 @@ def test_idl_with_every_primitive(tmp_path):
     assert (columns["names[]"].tolist(), series.counts["names[]"].tolist()) == (["a", ""] * 3, [2, 2, 2])
 
 
-def test_conflicting_definitions_of_two_channels_do_not_meet(tmp_path):
+def test_conflicting_definitions_of_two_channels_are_kept_apart(tmp_path):
     texts = {
         "a_msgs/msg/A": "x_msgs/X x\n" + "=" * 80 + "\nMSG: x_msgs/X\nfloat32 v\n",
         "b_msgs/msg/B": "x_msgs/X x\n" + "=" * 80 + "\nMSG: x_msgs/X\nint64 v\n",
@@ -142,36 +142,36 @@ def batch_of(payloads):
 
 
 @pytest.mark.parametrize("gathered", [True, False])
-def test_a_byte_of_a_bool_can_be_any(monkeypatch, gathered):
+def test_any_byte_but_zero_of_a_bool_is_true(monkeypatch, gathered):
     if not gathered:
         monkeypatch.setattr(decode, "derive", lambda *_: None)
     schema = parse_definition("a_msgs/msg/A", "ros2msg", "bool[2] two\nbool[] any\nbool one\n")
     payload = b"\0\1\0\0\2\0\0\0\2\0\0\0\0\xff\x80"
-    part = decode.Decoder(schema, ("two", "any[]", "one")).decode(batch_of([payload] * 9))
+    decoded = decode.Decoder(schema, ("two", "any[]", "one")).decode(batch_of([payload] * 9))
     for path, expected in (("two", [[True, False]] * 9), ("any[]", [False, True] * 9), ("one", [True] * 9)):
-        assert part.columns[path].tolist() == expected
-        assert set(part.columns[path].tobytes()) <= {0, 1}
+        assert decoded.columns[path].tolist() == expected
+        assert set(decoded.columns[path].tobytes()) <= {0, 1}
 
 
 @pytest.mark.parametrize("path", ["word", "other"])
-def test_a_text_that_is_no_utf8_is_no_message(path):
-    """Whether the text is wanted or not: else what is lost would hang on how messages are decoded."""
+def test_a_message_whose_text_is_not_utf8_does_not_decode(path):
+    """This holds for texts that are not wanted, too, so that both methods of decoding lose the same messages."""
     schema = parse_definition("a_msgs/msg/A", "ros2msg", "string word\nstring other\n")
     good, bad = b"\0\1\0\0\3\0\0\0\xc3\xbc\0\0\2\0\0\0o\0", b"\0\1\0\0\3\0\0\0\xff\xbc\0\0\2\0\0\0o\0"
-    part = decode.Decoder(schema, (path,)).decode(batch_of([good, bad, good]))
-    assert part.columns[path].tolist() == [{"word": "ü", "other": "o"}[path]] * 2
-    assert (part.order.tolist(), part.count) == ([0, 2], 3)
-    assert "'utf-8' codec can't decode byte 0xff" in part.trouble
+    decoded = decode.Decoder(schema, (path,)).decode(batch_of([good, bad, good]))
+    assert decoded.columns[path].tolist() == [{"word": "ü", "other": "o"}[path]] * 2
+    assert (decoded.order.tolist(), decoded.count) == ([0, 2], 3)
+    assert "'utf-8' codec can't decode byte 0xff" in decoded.error
 
 
-def test_messages_smaller_than_a_definitions_array_take_no_memory(tmp_path):
+def test_messages_smaller_than_the_array_of_their_definition_take_no_memory(tmp_path):
     definitions = {"a_msgs/msg/A": ("ros2msg", "float64[200000000] d\n")}
     messages = [forge.Message("/a", "a_msgs/msg/A", k, b"\0\1\0\0" + bytes(288)) for k in range(50)]
     result = read(forge.forge(tmp_path / "run.mcap", messages, definitions=definitions), {"/a": ("d",)})
     assert result.series["/a"].columns["d"].shape == (0, 200_000_000)
-    (note,) = result.damage
-    assert "all 50 messages of /a do not decode" in note.reason
-    assert "(expected an array of 1600000000 bytes, found messages of up to 292 bytes)" in note.reason
+    (damage,) = result.damage
+    assert "all 50 messages of /a do not decode" in damage.reason
+    assert "(expected an array of 1600000000 bytes, found messages of up to 292 bytes)" in damage.reason
 
 
 def test_one_message_that_does_not_decode_is_damage(tmp_path):

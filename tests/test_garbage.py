@@ -56,7 +56,7 @@ def test_garbage_over_the_head_of_a_compressed_chunk(path, variant):
     data = overwritten(log, chunk.start, noise(64))
     if variant in {"zstd", "lz4"}:
         # the summary says where the chunk stands, and its message indexes what is lost
-        reason = rf"the chunk's head does not parse \(.*\); {lost_in(log, number, variant)}"
+        reason = rf"the chunk's header does not parse \(.*\); {lost_in(log, number, variant)}"
         check(path, data, kept, (chunk.start, log.end(number), log.span(number), reason))
         return
     following = log.chunks[number + 1].start
@@ -82,7 +82,7 @@ def test_garbage_over_the_head_of_a_chunk_that_is_not_compressed(path, variant):
     damages = [(chunk.start, following, span, reason)]
     if lost and variant == "unchecked":
         topic, count = TOPICS[lost[0].channel], sum(message.channel == lost[0].channel for message in log.wanted)
-        counted = f"{count} messages of {topic} promised by the statistics, {count - 1} are there"
+        counted = f"the statistics count {count} messages of {topic}, {count - 1} were found"
         damages.append((0, len(data), None, counted))
     check(path, data, log.without(lost), *damages)
 
@@ -118,13 +118,13 @@ def test_garbage_over_a_messages_length_in_a_chunk(path, variant):
     number = log.chunks.index(message.chunk)
     length = strict_log.chunk_head(log.data[message.chunk.contents])[0]
     reason = (
-        f"no record starts at byte {message.place.start} of {length} of the uncompressed chunk; what stands up to byte "
-        f"{message.place.stop} was read by its message index, or is lost"
+        f"no record starts at byte {message.place.start} of {length} of the uncompressed chunk; messages up to byte "
+        f"{message.place.stop} were read by the message index, or are lost"
     )
     data = overwritten(log, body(log, message).start + 1, noise(8))
     topic = TOPICS[message.channel]
     count = sum(one.channel == message.channel for one in log.inside(number))
-    counted = f"{count} messages of {topic} in the chunk's message index, {count - 1} are there"
+    counted = f"the chunk's message index lists {count} messages of {topic}, {count - 1} were found"
     reasons = [reason] if "no summary" in variant else [reason, counted]
     place = message.chunk.start, log.end(number), log.span(number)
     check(path, data, log.without([message]), *((*place, reason) for reason in reasons))
@@ -144,8 +144,8 @@ def test_a_wrong_crc_of_the_data(path):
     (end,) = [one.start for one in log.strict.records if one.code == strict_log.DATA_END]
     (crc,) = struct.unpack_from("<I", log.data, end + 9)
     reason = (
-        rf"the CRC of the data section is 0x[0-9a-f]{{8}}, expected {crc:#010x}: bytes have changed, and a message "
-        "that reads well may be wrong"
+        rf"the CRC of the data section is 0x[0-9a-f]{{8}}, expected {crc:#010x}: some bytes have changed, so values "
+        "that look valid may be wrong"
     )
     image = next(message for message in log.strict.messages[15_000:] if len(message.record) > 10_000)
     data = overwritten(log, image.place.start + 5_000, b"changed")
@@ -168,7 +168,7 @@ def test_a_compressed_file_cut_at_60_per_cent(path, compression, variant):
     if number is not None:
         there = f"{size - record.start - 9} of {record.stop - record.start - 9} bytes are there"
         inside = rf"the file ends inside a chunk \({there}\); {CUT}"
-    outside = f"the {compression} compression is cut; what stood behind is lost, what stands before is read"
+    outside = f"the {compression} data are cut off; everything before was read, the rest is lost"
     damages = (record.start, size, span, inside), (cut_block(compression, stored), len(stored), None, outside)
     check(path, stored, log.before(size), *sorted(damages, key=lambda damage: damage[0]))
 

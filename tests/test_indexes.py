@@ -1,4 +1,4 @@
-"""Message indexes that lie, and definitions that stand where nobody looks."""
+"""Message indexes that are wrong, and definitions in chunks that are not opened."""
 
 import struct
 
@@ -31,7 +31,7 @@ def indexes(path, channel=WRENCH_ID):
 
 
 def rewrite(path, change, channel=WRENCH_ID):
-    """Change the (n, 2) times and offsets of a channel in every chunk; behind fewer rows stands a private record."""
+    """Change the (n, 2) times and offsets of a channel in every chunk; a private record fills the rest."""
     data = bytearray(path.read_bytes())
     for at in indexes(path, channel):
         (size,) = struct.unpack_from("<I", data, at + 2)
@@ -110,7 +110,7 @@ def test_an_index_of_another_channel(tmp_path, run, options):
     "options",
     [{}, NO_SUMMARY],
 )
-def test_an_index_of_a_channel_that_is_nowhere_defined(tmp_path, run, options):
+def test_an_index_of_an_undefined_channel(tmp_path, run, options):
     path = forge.forge(tmp_path / "other.mcap", forge.run(COUNT), **options)
     for at in indexes(run):
         forge.overwrite(path, at, struct.pack("<H", 99))
@@ -148,7 +148,7 @@ def test_times_come_from_indexes_or_from_the_messages(run):
 
 
 def late(path, *, split, statistics):
-    """Much of /a, the definitions of /b, more of /a, messages of /b; if split, the channel stands with its messages."""
+    """Much of /a, the definitions of /b, more of /a, messages of /b; with `split`, channel /b stands with these."""
     with path.open("wb") as file:
         options = NO_SUMMARY | {"use_statistics": statistics}
         writer = Writer(file, chunk_size=300, compression=CompressionType.NONE, **options)
@@ -178,8 +178,8 @@ PLACES = pytest.mark.parametrize(
 @pytest.mark.parametrize("threads", [1, 4])
 @pytest.mark.parametrize("wants", [{"/b": ("y",)}, {"/a": ("x",), "/b": ("y",)}])
 @PLACES
-def test_definitions_in_a_chunk_that_was_passed_by(tmp_path, split, statistics, wants, threads):
-    """Its message index names /a only, so that who looks for /b has no reason to open it."""
+def test_definitions_in_a_chunk_that_was_skipped(tmp_path, split, statistics, wants, threads):
+    """The message index of the chunk names /a only, so that it is not opened for /b."""
     result = read(late(tmp_path / "run.mcap", split=split, statistics=statistics), wants, threads=threads)
     assert result.damage == ()
     for topic, (field,) in wants.items():
@@ -187,7 +187,7 @@ def test_definitions_in_a_chunk_that_was_passed_by(tmp_path, split, statistics, 
 
 
 @PLACES
-def test_scan_finds_definitions_in_chunks_that_nobody_opens(tmp_path, split, statistics):
+def test_scan_finds_definitions_in_chunks_that_it_does_not_open(tmp_path, split, statistics):
     contents = scan(late(tmp_path / "run.mcap", split=split, statistics=statistics))
     assert [(channel.topic, channel.schema_name) for channel in contents.channels] == [
         ("/a", "a/msg/A"),

@@ -362,7 +362,7 @@ def test_one_log_that_is_none_does_not_hide_the_others(inspect, navirl, tmp_path
     (tmp_path / "bad.mcap").write_bytes(b"\x89MCA")
     views, errors = inspect(tmp_path / "bad.mcap", good, code=3)
     assert [view["log"] for view in views] == ["good.mcap"]
-    assert "bad.mcap: expected an MCAP file, found its first 4 bytes only; nothing was recorded" in errors
+    assert "bad.mcap: expected an MCAP file, found only its first 4 bytes; nothing was recorded" in errors
     alone = navirl("inspect", tmp_path / "bad.mcap", code=1)
     assert "bad.mcap: expected an MCAP file" in alone.stderr
     assert alone.stdout == ""

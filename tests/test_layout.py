@@ -1,4 +1,4 @@
-"""Layouts by hand, and against decoding one by one, over every type and all data."""
+"""Layouts by hand, and decoding by layouts against decoding one by one, for random types and messages."""
 
 from unittest import mock
 
@@ -14,7 +14,7 @@ from navirl_cli.logs.messages import decode
 from navirl_cli.logs.messages.layout import derive
 from navirl_cli.logs.messages.schema import Leaf, Schema, SchemaError, parse_definition
 
-#: Ways to write a message by the name of a run of examples: all in one, or one message like this and one like that.
+#: The encoders of a run of examples, of which each message uses one.
 WIRES = {
     "cdr": (factory.Wire("cdr"),),
     "cdr, big-endian": (factory.Wire("cdr", ">"),),
@@ -37,13 +37,13 @@ def test_offsets_by_hand(odometry):
     assert offsets["header.stamp/nanosec"] == 8
     assert offsets["header.frame_id"] == 16
     assert offsets["child_frame_id"] == 28
-    # 24 + 4 + 3 = 31 of the message's bytes are used: the next double stands at 32, behind 4 bytes of encapsulation
+    # 24 + 4 + 3 = 31 of the message's bytes are used: the next double stands at 32, after 4 bytes of encapsulation
     assert offsets["pose.pose.position.x"] == 36
     assert layout.dtype.itemsize == len(payload)
     assert list(layout.checks.values()) == [0x0100, 5, 0, 3, 0]
 
 
-def test_a_payload_that_is_no_such_message_has_no_layout(odometry):
+def test_an_invalid_payload_has_no_layout(odometry):
     payload = forge.cdr(forge.odometry(1, 2.0, 3.0))
     assert derive(odometry, payload, []) is not None
     assert derive(odometry, payload + bytes(3), []) is not None
@@ -68,10 +68,10 @@ def test_leaves_in_sequences():
     assert schema.leaf("transforms[].header.stamp") == Leaf("time", "<i8", None, "transforms[]")
     assert schema.leaf("transforms[].child_frame_id") == Leaf("string", "O", None, "transforms[]")
     for path, message in (
-        ("transforms", "'transforms' is no number, text, time or fixed array of numbers"),
-        ("transforms[]", r"'transforms\[\]' is no number, text, time or fixed array of numbers"),
-        ("transforms.header.stamp", "'header' in .* lies below a field that is no single message"),
-        ("transforms[].header[].stamp", r"'header\[\]' in .* is no sequence, or lies in another one"),
+        ("transforms", "'transforms' is not a number, text, time or fixed array of numbers"),
+        ("transforms[]", r"'transforms\[\]' is not a number, text, time or fixed array of numbers"),
+        ("transforms.header.stamp", "'header' in .* is below a field that is not a single message"),
+        ("transforms[].header[].stamp", r"'header\[\]' in .* is not a sequence, or is inside another one"),
         ("transforms[].pose", "TransformStamped has no field 'pose' of .*; its fields are header, child_frame_id, tr"),
     ):
         with pytest.raises(SchemaError, match=message):
@@ -98,8 +98,8 @@ def test_a_schema_is_parsed_once(odometry):
     assert parse_definition(forge.ODOMETRY, *forge.definition(forge.ODOMETRY, {})) is odometry
 
 
-def spoilt(payload, rng):
-    """A payload that a recorder or a disk has damaged."""
+def damaged(payload, rng):
+    """A damaged payload."""
     at = int(rng.integers(len(payload) + 1))
     return factory.pick(
         rng,
@@ -116,17 +116,17 @@ def spoilt(payload, rng):
 
 
 def written(types, wires, rng, n=16):
-    """Bytes in which messages of several channels stand, and by channel: number, place and message, None if spoilt."""
+    """Bytes with messages of several channels; by channel: number, place, size and message, None if damaged."""
     raw = bytearray()
     rows = [[] for _ in types]
     for number in range(n):
         channel = int(rng.integers(len(types)))
         # few plans of lengths, so that messages share their layouts
         plan = np.random.default_rng(int(rng.integers(3)))
-        message = factory.value(factory.Kind(types[channel]), plan, rng)
+        message = factory.value(factory.FieldType(types[channel]), plan, rng)
         payload = factory.pick(rng, wires).payload(types[channel], message)
         if rng.random() < 0.25:
-            payload, message = spoilt(payload, rng), None
+            payload, message = damaged(payload, rng), None
         rows[channel].append((number, len(raw), len(payload), message))
         raw += payload + bytes(int(rng.integers(3)))
     return bytes(raw), rows
@@ -138,16 +138,16 @@ def decoded(decoder, raw, rows):
 
 
 def bits(column):
-    """Type, shape and bytes of a column; all NaN are one, for some machines change them by looking at them."""
+    """Type, shape and bytes of a column; all NaN count as one, because some machines change them when they are read."""
     if column.dtype == object:
         return column.dtype, column.shape, column.tolist()
     plain = np.where(np.isnan(column), np.nan, column) if column.dtype.kind == "f" else column
     return column.dtype, column.shape, plain.astype(column.dtype).tobytes()
 
 
-def check_both_ways(fields, schema, raw, rows):
-    """Gathered at once and one by one the columns are the same, and whole messages give what was written."""
-    paths = {path: (sequence, kind) for path, sequence, kind in factory.columns(fields)}
+def check_both_methods(fields, schema, raw, rows):
+    """Check that both methods of decoding give the same columns, and for intact messages what was written."""
+    paths = {path: (sequence, field_type) for path, sequence, field_type in factory.columns(fields)}
     fast, slow = decode.Decoder(schema, tuple(paths)), decode.Decoder(schema, tuple(paths))
     for some in filter(None, (rows[:4], rows[4:])):
         gathered = decoded(fast, raw, some)
@@ -155,13 +155,13 @@ def check_both_ways(fields, schema, raw, rows):
             plain = decoded(slow, raw, some)
         assert gathered.order.tolist() == plain.order.tolist()
         assert gathered.log_time_ns.tolist() == [7 * number for number in plain.order]
-        assert (gathered.count, bool(gathered.trouble)) == (len(some), len(plain.order) < len(some))
-        whole = [row for row in some if row[3] is not None]
-        assert {row[0] for row in whole} <= set(plain.order.tolist())
-        assert all(derive(schema, raw[start : start + size], paths) for _, start, size, _ in whole)
-        right = np.isin(gathered.order, [row[0] for row in whole])
-        for path, (sequence, kind) in paths.items():
-            column, counts = factory.expected([row[3] for row in whole], path, sequence, kind)
+        assert (gathered.count, bool(gathered.error)) == (len(some), len(plain.order) < len(some))
+        intact = [row for row in some if row[3] is not None]
+        assert {row[0] for row in intact} <= set(plain.order.tolist())
+        assert all(derive(schema, raw[start : start + size], paths) for _, start, size, _ in intact)
+        right = np.isin(gathered.order, [row[0] for row in intact])
+        for path, (sequence, field_type) in paths.items():
+            column, counts = factory.expected([row[3] for row in intact], path, sequence, field_type)
             assert bits(gathered.columns[path]) == bits(plain.columns[path])
             taken = right
             if sequence:
@@ -174,7 +174,7 @@ def check_both_ways(fields, schema, raw, rows):
 @pytest.mark.parametrize("encoding", ["cdr", "ros1"])
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(types=st.lists(factory.messages(3), min_size=1, max_size=2), seed=st.integers(0, 2**32))
-def test_both_ways_of_decoding_give_what_was_written(encoding, types, seed):
+def test_both_methods_of_decoding_give_what_was_written(encoding, types, seed):
     ros = 1 if encoding == "ros1" else 2
     schemas = [
         parse_definition("t_msgs/M0", f"ros{ros}msg", factory.definition(fields, ros), encoding) for fields in types
@@ -182,4 +182,4 @@ def test_both_ways_of_decoding_give_what_was_written(encoding, types, seed):
     for wires in [wires for name, wires in WIRES.items() if name.startswith(encoding)]:
         raw, rows = written(types, wires, np.random.default_rng(seed))
         for fields, schema, mine in zip(types, schemas, rows, strict=True):
-            check_both_ways(fields, schema, raw, mine)
+            check_both_methods(fields, schema, raw, mine)

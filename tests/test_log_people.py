@@ -162,7 +162,7 @@ def test_each_marker_has_its_own_frame(load):
     recording = load(say, SEEN_S[SEEN_S < 7.5])
     (lost,) = recording.damage
     assert lost.startswith(
-        "run.mcap: 15 places on /people_markers left out: transform from 'moon' to 'map': expected fra"
+        "run.mcap: 15 places on /people_markers left out: transform from 'moon' to 'map': expected con"
     )
     assert [track.name for track in recording.people] == ["p/1", "p/2"]
     check_walker(recording.people[0], SEEN_S[SEEN_S < 7.5])

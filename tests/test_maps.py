@@ -80,8 +80,8 @@ def test_a_frame_that_tf_repeats_without_moving_is_no_other(load):
 
 def test_a_map_in_an_unknown_frame(load):
     message = (
-        r"^run.mcap: the map is given in frame 'floor': transform from 'floor' to 'map': expected frames that connect, "
-        r"found map -> odom; floor stands alone; record /tf"
+        r"^run.mcap: the map is given in frame 'floor': transform from 'floor' to 'map': expected connected frames, "
+        r"found map -> odom; floor is in no transform; record /tf"
     )
     with pytest.raises(FrameError, match=message):
         load(drawn(frame="floor"), frame="map")

@@ -1,4 +1,4 @@
-"""The reader against mcap's own reader and rosbags, over every way of writing a file."""
+"""The reader against mcap's own reader and rosbags, for every variant of the format."""
 
 import os
 import struct
@@ -41,17 +41,17 @@ def check_same(paths, topic, fields, *, expected_count=None):
     return series
 
 
-@pytest.mark.parametrize("way", forge.WAYS)
-def test_every_way_of_writing_reads_as_the_slow_twin(tmp_path, way):
-    path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS[way])
+@pytest.mark.parametrize("variant", forge.WAYS)
+def test_every_variant_reads_as_the_slow_twin(tmp_path, variant):
+    path = forge.forge(tmp_path / "run.mcap", forge.run(), **forge.WAYS[variant])
     check_same(path, "/wrench", WRENCH_FIELDS, expected_count=600)
     check_same(path, "/odom", ODOM_FIELDS, expected_count=60)
 
 
-@pytest.mark.parametrize("way", forge.WAYS)
-def test_scan_counts_every_way_of_writing(tmp_path, way):
+@pytest.mark.parametrize("variant", forge.WAYS)
+def test_scan_counts_every_variant(tmp_path, variant):
     metadata = [("rosbag2", {"a": "1"}), ("navirl", {"person": "ann"}), ("navirl", {"person": "bob"})]
-    path = forge.forge(tmp_path / "run.mcap", forge.run(), metadata=metadata, **forge.WAYS[way])
+    path = forge.forge(tmp_path / "run.mcap", forge.run(), metadata=metadata, **forge.WAYS[variant])
     contents = scan(path)
     assert (contents.profile, contents.library) == ("ros2", "forged")
     assert [contents.topic_count(topic) for topic in ("/wrench", "/odom", "/camera", "/none")] == [600, 60, 30, 0]
@@ -158,7 +158,7 @@ def test_several_channels_of_one_topic_keep_the_order_of_the_file(tmp_path):
 
 
 def tf_log(path, times_ns, seed, topics=("/tf",), **options):
-    """Transforms of 0 to 4 children with names of different lengths, in no order of time."""
+    """Transforms of 0 to 4 children with names of different lengths, in random order of time."""
     rng = np.random.default_rng(seed)
     messages = []
     for number, t_ns in enumerate(times_ns):
@@ -252,8 +252,8 @@ def test_a_topic_that_no_file_has_is_left_out_and_an_empty_one_is_empty(tmp_path
         ((10, 20, 30), {}),
     ],
 )
-def test_of_some_topics_only_the_latest_message_that_decodes(tmp_path, times, options):
-    """It is that of 20 ns; what is received at 30 ns does not decode."""
+def test_the_latest_message_that_decodes_is_kept(tmp_path, times, options):
+    """It is the one of 20 ns; the one of 30 ns does not decode."""
     messages = [
         forge.Message("/joy", forge.JOY, t, forge.cdr(forge.joy(t, [t, k]))[: -5 if t == 30 else None])
         for k, t in enumerate(times)

@@ -1,4 +1,4 @@
-"""Definitions that no parser should swallow, and JSON, which has none."""
+"""Definitions that must be refused, and JSON, which has no definitions."""
 
 import json
 import re
@@ -14,9 +14,9 @@ from navirl_cli.logs.messages.schema import JsonSchema, SchemaError, parse_defin
 TINY = {"chunk_size": 1}
 
 
-def test_names_and_texts_as_recorders_write_them():
+def test_names_and_definitions_as_recorders_write_them():
     assert parse_definition("a_msgs/A", "ros2msg", "float64 x # metres\r\n\r\nint32 y\r\n").name == "a_msgs/msg/A"
-    assert parse_definition("a_msgs/A", "ros1msg", "time t\nduration[2] d\n", "ros1").leaf("d[]").kind == "time"
+    assert parse_definition("a_msgs/A", "ros1msg", "time t\nduration[2] d\n", "ros1").leaf("d[]").value_type == "time"
     full = "a_msgs/B b\n" + "=" * 80 + "\nMSG: a_msgs/msg/B\nstring<=9[<=3] words\nfloat32[4] q 1.0\nuint8 ANY=3\n"
     assert parse_definition("a_msgs/msg/A", "ros2msg", full).leaf("b.q").count == 4
 
@@ -51,7 +51,7 @@ def test_names_and_texts_as_recorders_write_them():
         ),
     ],
 )
-def test_definitions_that_cannot_be_used_are_named(encoding, text, message):
+def test_invalid_definitions_are_refused(encoding, text, message):
     with pytest.raises(SchemaError) as caught:
         parse_definition("a_msgs/msg/A", encoding, text)
     assert message in str(caught.value)
@@ -59,7 +59,7 @@ def test_definitions_that_cannot_be_used_are_named(encoding, text, message):
 
 
 def test_messages_without_fields():
-    """They have one byte in CDR and none in ROS 1, of which a broken length could promise thousands of millions."""
+    """They take one byte in CDR and none in ROS 1, where a damaged length could claim billions of them."""
     text = "a_msgs/E[] all\n" + "=" * 80 + "\nMSG: a_msgs/E\n"
     assert parse_definition("a_msgs/msg/A", "ros2msg", text).deserialize(b"\0\1\0\0\2\0\0\0\0\0").all is not None
     with pytest.raises(SchemaError, match="all is a sequence of messages without fields"):
@@ -76,7 +76,7 @@ def read_json(tmp_path, messages, *fields, name="x/J", **options):
     ]
     definitions = {name: ("jsonschema", "{}") if name else ("", "")}
     path = forge.forge(tmp_path / "j.mcap", log, definitions=definitions, encodings={"/j": "json"}, **options)
-    # with more threads the first to learn is not always that of the first chunk
+    # with more threads, the first message that is learnt from may be in another chunk
     result = read(path, {"/j": fields}, threads=1)
     return result.series["/j"], [note.reason for note in result.damage]
 
@@ -103,7 +103,7 @@ def test_spellings_of_times(tmp_path, spelling, name):
 
 
 def test_numbers(tmp_path):
-    """A number is a double, whether the first is written as one or not; null is what JSON has for NaN."""
+    """A number is a double, even if the first is written as an integer; null in JSON stands for NaN."""
     messages = [{"x": 3, "y": [1, 2]}, {"x": 0.25, "y": [None, 1e300]}, {"x": None, "y": [True, -0.0]}]
     series, notes = read_json(tmp_path, messages, "x", "y", "y[]")
     assert notes == []
@@ -117,7 +117,7 @@ GOOD = {"t": {"sec": 1, "nanosec": 2}, "x": 1.5, "s": "a", "three": [1, 2, 3], "
 
 
 @pytest.mark.parametrize(
-    ("wrong", "trouble"),
+    ("wrong", "error"),
     [
         ({"x": "1.5"}, "expected a number, found '1.5'"),
         ({"x": {"v": 1}}, "expected a number, found {'v': 1}"),
@@ -135,35 +135,35 @@ GOOD = {"t": {"sec": 1, "nanosec": 2}, "x": 1.5, "s": "a", "three": [1, 2, 3], "
         ({"three": 7}, "expected 3 numbers, found 7"),
         ({"three": [1, 2, "3"]}, "expected a number, found '3'"),
         ({"three": [1, 2, [3]]}, r"expected a number, found \[3\]"),
-        ({"all": "b"}, "'all' is no sequence"),
-        ({"all": {"n": "b"}}, "'all' is no sequence"),
+        ({"all": "b"}, "'all' is not a sequence"),
+        ({"all": {"n": "b"}}, "'all' is not a sequence"),
         ({"all": [{"n": "b"}, None]}, r"no field 'n' of 'n'"),
         ({"all": [{"n": "b"}, {"n": 3}]}, "expected a text, found int"),
-        ("{", "no JSON: Expecting property name"),
+        ("{", "not JSON: Expecting property name"),
         ("[1]", "expected a JSON object, found list"),
-        ("[" * 100_000, "no JSON: maximum recursion depth"),
+        ("[" * 100_000, "not JSON: maximum recursion depth"),
         ("{}", "no field 't' of 't'"),
     ],
 )
-def test_a_message_that_is_not_like_the_others_is_lost_and_counted(tmp_path, wrong, trouble):
+def test_a_message_of_another_type_is_lost_and_counted(tmp_path, wrong, error):
     odd = wrong if isinstance(wrong, str) else GOOD | wrong
     series, (note,) = read_json(tmp_path, [GOOD, odd, GOOD], "t", "x", "s", "three", "all[].n")
     assert series.log_time_ns.tolist() == [0, 2]
     assert series.columns["t"].tolist() == [1_000_000_002] * 2
     assert series.columns["three"].tolist() == [[1.0, 2.0, 3.0]] * 2
     assert series.columns["all[].n"].tolist() == ["b"] * 2
-    assert re.match(rf"1 of 3 messages of /j do not decode as x/J and are lost \(.*{trouble}", note), note
+    assert re.match(rf"1 of 3 messages of /j do not decode as x/J and are lost \(.*{error}", note), note
 
 
 @pytest.mark.parametrize("path", ["values", "x.count", "y.real", "s.upper", "z.append"])
-def test_what_pythons_objects_have_is_no_field(tmp_path, path):
+def test_attributes_of_python_objects_are_not_fields(tmp_path, path):
     series, (note,) = read_json(tmp_path, [{"x": [1], "y": 2, "s": "a", "z": []}], path)
     assert len(series) == 0
     assert f"all 1 messages of /j do not decode as x/J and are lost (no field '{path.split('.')[-1]}' of" in note
 
 
-def test_what_tells_nothing_is_not_learnt_from(tmp_path):
-    """Empty lists and messages without the field come first; what a field is the first that has one tells."""
+def test_types_are_learnt_from_the_first_message_with_the_field(tmp_path):
+    """Empty lists and messages without the field come first and are skipped."""
     first = [{"names": [], "three": [], "all": []}, {"pad": "x"}, "no JSON"]
     then = {"names": ["a", "b"], "three": [1, 2, 3], "all": [{"t": {"sec": 1, "nsec": 0}}]}
     series, (note,) = read_json(tmp_path, [*first, then, then], "names[]", "three", "all[].t")
@@ -174,13 +174,13 @@ def test_what_tells_nothing_is_not_learnt_from(tmp_path):
     assert note.startswith("3 of 5 messages of /j")
 
 
-def test_times_are_exact_although_the_first_chunk_tells_nothing(tmp_path):
+def test_times_are_exact_if_the_first_chunk_lacks_the_field(tmp_path):
     then = {"t": {"sec": 1_700_000_000, "nanosec": 123_456_789}}
     series, _ = read_json(tmp_path, [{}, *[then] * 9], "t", **TINY)
     assert series.columns["t"].tolist() == [1_700_000_000_123_456_789] * 9
 
 
-def test_arrays_although_the_first_chunk_tells_nothing(tmp_path):
+def test_arrays_are_read_if_the_first_chunk_lacks_the_field(tmp_path):
     series, _ = read_json(tmp_path, [{}, *[{"q": [1, 2, 3]}] * 9], "q", **TINY)
     assert series.columns["q"].shape == (9, 3)
 
@@ -192,9 +192,9 @@ def test_channels_do_not_learn_from_each_other(tmp_path):
         assert (series.columns["x"].tolist(), notes) == (expected, [])
 
 
-def test_what_is_learnt_stays():
+def test_types_that_were_learnt_stay():
     schema = JsonSchema("x/J")
-    assert schema.leaf("x").kind == "number"
+    assert schema.leaf("x").value_type == "number"
     assert not schema.learn(b'{"y": 1}', ("x", "y"))
     assert schema.learn(b'{"x": "a", "y": "b"}', ("x", "y"))
-    assert (schema.leaf("x").kind, schema.leaf("y").kind) == ("string", "number")
+    assert (schema.leaf("x").value_type, schema.leaf("y").value_type) == ("string", "number")

@@ -57,11 +57,11 @@ def test_files_are_recordings_whatever_their_names(tmp_path):
 
 
 def test_what_is_not_there_is_named(tmp_path):
-    with pytest.raises(LogError, match=r"none.mcap: expected an MCAP file, found nothing there; check the path"):
+    with pytest.raises(LogError, match=r"none.mcap: expected an MCAP file, found no file there; check the path"):
         sources_of([tmp_path / "none.mcap"])
     (tmp_path / "gone.mcap").symlink_to(tmp_path / "none.mcap")
     for argument in (tmp_path, tmp_path / "gone.mcap", tmp_path / "*.mcap"):
-        with pytest.raises(LogError, match=r"gone.mcap: expected an MCAP file, found nothing there; check the path"):
+        with pytest.raises(LogError, match=r"gone.mcap: expected an MCAP file, found no file there; check the path"):
             sources_of([argument])
 
 

@@ -1,4 +1,4 @@
-"""Any number of threads reads the same."""
+"""Reading gives the same for any number of threads."""
 
 import log_factory as forge
 import numpy as np
@@ -10,12 +10,12 @@ WANTS = {
     "/wrench": ("header.stamp", "header.frame_id", "wrench.force.x"),
     "/odom": ("header.stamp", "pose.covariance", "child_frame_id"),
     "/tf": ("transforms[].header.stamp", "transforms[].child_frame_id", "transforms[].transform.translation.x"),
-    # its definition does not parse
+    # the definition of these does not parse
     "/camera": ("header.stamp",),
 }
 
 
-def whole(data, rng):
+def intact(data, rng):
     """No damage."""
 
 
@@ -26,24 +26,24 @@ def flipped(data, rng):
 
 
 def zeroed(data, rng):
-    """Two places of a disk that gave nothing."""
+    """Zeros in two places, where the disk failed."""
     for at in rng.integers(200, len(data) - 2000, size=2):
         data[at : at + 900] = bytes(900)
 
 
 def cut(data, rng):
-    """A recorder that was killed."""
+    """A file whose recorder was killed."""
     del data[int(rng.integers(len(data) // 3, len(data))) :]
 
 
 def inserted(data, rng):
-    """Bytes of something else."""
+    """Random bytes in one place."""
     at = int(rng.integers(200, len(data)))
     data[at:at] = rng.bytes(333)
 
 
 def messages():
-    """A run with transforms in no order of time, and some messages that are none."""
+    """A run with transforms in random order of time, some of which do not decode."""
     rng = np.random.default_rng(11)
     run = forge.run(120, frame_ids=("a", "bb"))
     for number in range(30):
@@ -58,16 +58,16 @@ def run():
     return messages()
 
 
-CASES = [(way, whole) for way in forge.WAYS] + [
-    (way, damage)
-    for way in ("zstd", "uncompressed chunks", "no summary, no chunks")
+CASES = [(variant, intact) for variant in forge.WAYS] + [
+    (variant, damage)
+    for variant in ("zstd", "uncompressed chunks", "no summary, no chunks")
     for damage in (flipped, zeroed, cut, inserted)
 ]
 
 
-@pytest.mark.parametrize(("way", "damage"), CASES)
-def test_threads_change_nothing(tmp_path, run, way, damage):
-    path = forge.forge(tmp_path / "run.mcap", run, **({"chunk_size": 2000} | forge.WAYS[way]))
+@pytest.mark.parametrize(("variant", "damage"), CASES)
+def test_threads_change_nothing(tmp_path, run, variant, damage):
+    path = forge.forge(tmp_path / "run.mcap", run, **({"chunk_size": 2000} | forge.WAYS[variant]))
     data = bytearray(path.read_bytes())
     damage(data, np.random.default_rng(13))
     path.write_bytes(bytes(data))
@@ -81,10 +81,12 @@ def test_threads_change_nothing(tmp_path, run, way, damage):
         for name, column in series.columns.items():
             assert column.dtype == other.columns[name].dtype
             assert np.array_equal(column, other.columns[name], equal_nan=column.dtype.kind == "f"), name
-    if damage is whole:
+    if damage is intact:
         assert len(one.series["/wrench"]) == 120
-        _, note = one.damage
-        assert note.reason.startswith("5 of 30 messages of /tf do not decode as tf2_msgs/msg/TFMessage and are lost (")
+        _, undecodable = one.damage
+        assert undecodable.reason.startswith(
+            "5 of 30 messages of /tf do not decode as tf2_msgs/msg/TFMessage and are lost ("
+        )
 
 
 @pytest.mark.parametrize("threads", [1, 8])
@@ -94,5 +96,5 @@ def test_spans_count_from_the_files_first_message(tmp_path, threads):
     run = [forge.Message("/wrench", forge.WRENCH, t, forge.cdr(forge.wrench(t, (1, 2, 3)))) for t in times]
     path = forge.forge(tmp_path / "run.mcap", run, chunk_size=1)
     forge.overwrite(path, forge.chunk_starts(path)[0][0] + 9 + 24, b"\1\2\3\4")
-    (note,) = read(path, {"/wrench": ("wrench.force.x",)}, threads=threads).damage
-    assert note.span_s == (10.0, 10.0)
+    (damage,) = read(path, {"/wrench": ("wrench.force.x",)}, threads=threads).damage
+    assert damage.span_s == (10.0, 10.0)

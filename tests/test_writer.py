@@ -1,3 +1,5 @@
+"""Written logs: read back, byte by byte the same, and nothing left after an error."""
+
 import log_factory as forge
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ def write(path, **options):
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_what_is_written_reads_back(tmp_path, compression):
+def test_written_messages_are_read_back(tmp_path, compression):
     path = write(tmp_path / "a.mcap", compression=compression)
     result = read(path, {"/wrench": ("header.stamp", "header.frame_id", "wrench.force.x")})
     series = result.series["/wrench"]
@@ -69,8 +71,11 @@ def test_columns_of_fixed_arrays(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ({"wrench.force.x": [1.0]}, r"topic /w: wrench.force.x has shape \(1,\), expected \(2,\)"),
-        ({"header.frame_id": ["a", "b"]}, "topic /w: header.frame_id is a text, which the template gives"),
+        ({"wrench.force.x": [1.0]}, r"topic /w: wrench.force.x: expected shape \(2,\), found \(1,\)"),
+        (
+            {"header.frame_id": ["a", "b"]},
+            "topic /w: header.frame_id: expected numbers or times, found a text; set it in the template",
+        ),
         (
             {"wrench.mass": [1.0, 2.0]},
             "geometry_msgs/msg/Wrench has no field 'mass' of 'wrench.mass'; its fields are force, torque",
@@ -94,7 +99,7 @@ def test_an_exception_leaves_nothing_and_keeps_the_old_file(tmp_path):
     assert scan(path).topic_count("/wrench") == 500
 
 
-def test_refusals(tmp_path):
+def test_invalid_names_and_types_are_refused(tmp_path):
     path = tmp_path / "a.mcap"
     path.write_text("old")
     with (
@@ -114,7 +119,7 @@ def test_refusals(tmp_path):
     with LogWriter(tmp_path / "b.mcap") as log:
         log.message("/w", wrench(0, 0.0), 1)
         with pytest.raises(
-            LogError, match="topic /w holds geometry_msgs/msg/WrenchStamped, found a message of type built"
+            LogError, match="topic /w: expected messages of type geometry_msgs/msg/WrenchStamped, found one of built"
         ):
             log.message("/w", time_message(3), 1)
 

@@ -13,7 +13,7 @@ from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.messages.decode import Decoder, Part
+from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
@@ -198,7 +198,7 @@ def _first_messages(files: Sequence[RawFile]) -> tuple[dict[str, Stamped], str]:
         Stamps by topic, of transforms those of each message's first; and how the frames connect, empty without tf.
     """
     decoders: dict[Channel, Decoder | None] = {}
-    parts: dict[str, list[Part]] = {}
+    parts: dict[str, list[DecodedBatch]] = {}
 
     def wanted(channel: Channel) -> bool:
         if channel not in decoders:
@@ -237,10 +237,10 @@ def _decoder(channel: Channel) -> Decoder | None:
         leaves = [schema.leaf(path) for path in paths]
     except SchemaError:
         return None
-    return Decoder(schema, paths) if isinstance(schema, Schema) and leaves[0].kind == "time" else None
+    return Decoder(schema, paths) if isinstance(schema, Schema) and leaves[0].value_type == "time" else None
 
 
-def _stamped(topic: str, parts: Sequence[Part]) -> Stamped | None:
+def _stamped(topic: str, parts: Sequence[DecodedBatch]) -> Stamped | None:
     """The stamps of a topic's first messages."""
     logs, stamps = [], []
     for part in parts:

@@ -1,4 +1,4 @@
-"""What reading a log file hands on: channels and batches of messages; and the definitions of a file."""
+"""Channels, batches of messages, and the definitions of a file."""
 
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ Buffer = bytes | memoryview
 
 @dataclass(frozen=True)
 class Channel:
-    """A topic's source in one file; several channels of one topic are legal."""
+    """A stream of messages on a topic of one file; a topic may have several."""
 
     id: int
     topic: str
@@ -26,7 +26,7 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Messages of one channel that stand in one piece of memory."""
+    """Messages of one channel in one block of memory."""
 
     channel: Channel
     #: The bytes that hold them.
@@ -40,27 +40,28 @@ class Batch:
     order: IntArray
 
     def newest(self) -> "Batch":
-        """The message received last, alone."""
+        """The batch of the message that was received last."""
         row = slice(at := len(self.log_time_ns) - 1 - int(self.log_time_ns[::-1].argmax()), at + 1)
         return Batch(self.channel, self.raw, self.starts[row], self.sizes[row], self.log_time_ns[row], self.order[row])
 
     def payload(self, number: int) -> bytes:
-        """A copy of one payload, which does not keep the whole piece in memory."""
+        """A copy of one payload, which does not keep the block in memory."""
         start = int(self.starts[number])
         return bytes(self.raw[start : start + int(self.sizes[number])])
 
 
 def gathered(raw: Buffer, starts: IntArray, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """Copies of the same structure at many places.
+    """Copies of the structures at many places.
 
     Args:
         raw: Bytes.
-        starts: (n,) where the structures start, all of them inside.
+        starts: Where the structures start, shape (n,); all of them lie inside.
         dtype: The structure.
 
     Returns:
-        (n,) structures, gathered as plain bytes, which numpy does three times as fast.
+        Structures, shape (n,).
     """
+    # gathered as plain bytes, which numpy does three times as fast
     size = dtype.itemsize
     if not size:
         return np.empty(len(starts), dtype=dtype)
@@ -78,7 +79,7 @@ def message_batch(channel: Channel, raw: Buffer, offsets: IntArray, base: int) -
         base: Place of `raw` in the file's order.
 
     Returns:
-        The batch, without those offsets that point to something else than a message of this channel; None where all do.
+        The batch without the offsets that do not point to a message of this channel; None if no offset does.
     """
     last = len(raw) - records.MESSAGE_HEAD_SIZE
     offsets = offsets[(offsets >= 0) & (offsets <= last)]
@@ -98,39 +99,40 @@ def message_batch(channel: Channel, raw: Buffer, offsets: IntArray, base: int) -
 
 @dataclass
 class Definitions:
-    """The schemas and channels of a file, as far as they are known."""
+    """The schemas and channels of a file that are known so far."""
 
     schemas: dict[int, SchemaRecord] = field(default_factory=dict)
     channels: dict[int, ChannelRecord] = field(default_factory=dict)
-    #: Channels whose own records were met; others are known from the summary alone.
+    #: Channels whose records were found in the data section; others are known from the summary alone.
     met: set[int] = field(default_factory=set)
     _joined: dict[int, Channel] = field(default_factory=dict)
 
     def add(self, code: int, content: bytes) -> None:
-        """Take up a schema or channel record; any other code does nothing.
+        """Add a schema or channel record; other codes are ignored.
 
         Raises:
-            struct.error, ValueError: The contents are no such record, or contradict another one (`records.MALFORMED`).
+            struct.error, ValueError: The contents are malformed, or contradict another record (`records.MALFORMED`).
         """
         if code == records.SCHEMA:
             schema = records.parse_schema(content)
             if (known := self.schemas.setdefault(schema.id, schema)) != schema:
-                both = f"{known.name!r} and {schema.name!r}"
-                raise ValueError(f"schema {schema.id} is defined in two ways, as {both}; the first counts")
+                both = f"as {known.name!r} and as {schema.name!r}"
+                raise ValueError(f"schema {schema.id} is defined twice, {both}; the first definition is used")
         elif code == records.CHANNEL:
             channel = records.parse_channel(content)
             self.met.add(channel.id)
             if (one := self.channels.setdefault(channel.id, channel)) != channel:
                 first, second = one[1:], channel[1:]
-                raise ValueError(f"channel {channel.id} is defined as {first} and as {second}; the first counts")
+                both = f"as {first} and as {second}"
+                raise ValueError(f"channel {channel.id} is defined twice, {both}; the first definition is used")
 
     def knows(self, number: int) -> bool:
-        """Whether a channel is known, and its schema unless it has none."""
+        """Whether a channel is known, and its schema if it has one."""
         record = self.channels.get(number)
         return record is not None and (record.schema_id == 0 or record.schema_id in self.schemas)
 
     def channel(self, number: int) -> Channel:
-        """A known channel joined with its schema; without one, the schema's name and text are empty."""
+        """A known channel with its schema, whose name and text are empty if it has none."""
         if number not in self._joined or not self._joined[number].schema_name:
             record = self.channels[number]
             schema = self.schemas.get(record.schema_id) or SchemaRecord(0, "", "", "")

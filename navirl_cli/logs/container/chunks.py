@@ -1,4 +1,4 @@
-"""Pieces of a file that hold messages, opened: chunks, with their message indexes, and records outside of chunks."""
+"""Pieces of a file that hold messages: chunks with their message indexes, and records outside of chunks."""
 
 import threading
 import zlib
@@ -11,51 +11,51 @@ import zstandard
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Buffer
-from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, Found
+from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, FoundRecords
 
-#: A chunk that claims more is damaged: recorders write about 1 MB, and a wrong number must not fill the memory.
+#: A chunk that claims more is damaged: recorders write about 1 MB. A wrong number must not fill the memory.
 MAX_CHUNK_BYTES: Final = 1 << 28
 COMPRESSIONS: Final = frozenset({"", "zstd", "lz4"})
 
 
 class ChunkError(Exception):
-    """A chunk cannot be used; the message says why."""
+    """A chunk cannot be used; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Where messages stand in a file."""
+    """A part of a file that holds messages: a chunk, or a run of records outside of chunks."""
 
-    #: Place among all pieces.
+    #: Index among all pieces of the file.
     number: int
-    #: First byte, and first byte behind it, message indexes included.
+    #: First byte, and first byte after it; message indexes are included.
     start: int
     stop: int
-    #: Bytes of the chunk record that the file holds; 0 for records outside of chunks.
+    #: Bytes of the chunk record that are in the file; 0 outside of chunks.
     length: int = 0
-    #: Where each channel's message index stands, by channel; empty where there is none.
+    #: First byte of each message index, by channel.
     indexes: Mapping[int, int] = field(default_factory=dict)
-    #: First and last time of receipt in ns, as the chunk claims; None where it does not say.
+    #: First and last time of receipt in ns, as the chunk's fields state; None where they state none.
     span_ns: tuple[int, int] | None = None
     #: Whether the file ends inside of the chunk.
     cut: bool = False
-    #: Records outside of chunks, and what stands in them.
-    loose: tuple[bytes, Found] | None = None
+    #: Outside of chunks: the bytes, and the records in them.
+    unchunked: tuple[bytes, FoundRecords] | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Unpacked:
-    """A chunk's records."""
+class OpenedPiece:
+    """The records of a piece, decompressed."""
 
     raw: Buffer = b""
-    #: By channel: offsets of the messages in `raw` and their log times, as the chunk's message indexes say.
+    #: By channel: offsets of the messages in `raw` and their log times in ns, by the chunk's message indexes.
     indexes: dict[int, tuple[IntArray, IntArray]] = field(default_factory=dict)
-    #: Why there are no records.
-    trouble: str = ""
+    #: Why the chunk cannot be used; empty if it can.
+    error: str = ""
 
 
 class Decompressor:
-    """Decompresses chunk after chunk with one zstd context a thread, which is much faster than one a chunk."""
+    """Decompresses chunks with one zstd context per thread, which is much faster than one per chunk."""
 
     def __init__(self) -> None:
         self._local = threading.local()
@@ -67,8 +67,8 @@ class Decompressor:
         context: zstandard.ZstdDecompressor = self._local.zstd
         return context
 
-    def whole(self, head: ChunkHead, data: Buffer) -> Buffer:
-        """Decompress a complete chunk and check its size and CRC.
+    def complete(self, head: ChunkHead, data: Buffer) -> Buffer:
+        """Decompress a complete chunk, and check size and CRC.
 
         Args:
             head: The chunk's head.
@@ -91,15 +91,15 @@ class Decompressor:
             raise ChunkError(f"the chunk's CRC is {crc:#010x}, expected {head.crc:#010x}")
         return raw
 
-    def start(self, head: ChunkHead, data: Buffer) -> Buffer:
-        """Decompress what a cut chunk still holds.
+    def cut(self, head: ChunkHead, data: Buffer) -> Buffer:
+        """Decompress what is left of a chunk that is cut off.
 
         Args:
             head: The chunk's head.
             data: The compressed bytes before the cut.
 
         Returns:
-            The first bytes of the chunk's records, possibly none.
+            The first bytes of the chunk's records; may be empty.
 
         Raises:
             ChunkError: The compression is not supported.
@@ -118,7 +118,7 @@ class Decompressor:
 
     def _decompress(self, head: ChunkHead, data: Buffer) -> Buffer:
         if head.compression == "zstd":
-            # a false size must not be allocated
+            # memory of a wrong size must not be allocated
             claimed = zstandard.frame_content_size(data) if head.size else 0
             if claimed not in {head.size, -1}:
                 raise ChunkError(f"the chunk has {claimed} bytes uncompressed, expected {head.size}")
@@ -139,45 +139,45 @@ def _check(head: ChunkHead) -> None:
 
 def open_chunk(
     block: bytes, piece: Piece, decompressor: Decompressor, channels: Collection[int] | None = None
-) -> Unpacked:
+) -> OpenedPiece:
     """Decompress a chunk and read its message indexes.
 
     Args:
         block: The file's bytes of the piece.
         piece: A chunk.
-        decompressor: Its context is kept for the next chunk.
-        channels: Those whose message indexes are wanted; all where None.
+        decompressor: Decompresses the chunk.
+        channels: Channels whose message indexes are wanted; None for all.
     """
     indexes = indexes_of(block, piece, channels=channels)
     content = memoryview(block)[HEAD_SIZE : piece.length]
     try:
         head = records.parse_chunk_head(content)
     except records.MALFORMED as error:
-        return Unpacked(indexes=indexes, trouble=f"the chunk's head does not parse ({error})")
-    unpack: Callable[[ChunkHead, Buffer], Buffer] = decompressor.start if piece.cut else decompressor.whole
+        return OpenedPiece(indexes=indexes, error=f"the chunk's header does not parse ({error})")
+    unpack: Callable[[ChunkHead, Buffer], Buffer] = decompressor.cut if piece.cut else decompressor.complete
     if head.data_start + head.data_size != len(content) and not piece.cut:
-        trouble = f"the chunk's head claims {head.data_size} bytes, expected {len(content) - head.data_start}"
-        return Unpacked(indexes=indexes, trouble=trouble)
+        reason = f"the chunk's header claims {head.data_size} bytes, expected {len(content) - head.data_start}"
+        return OpenedPiece(indexes=indexes, error=reason)
     try:
         raw = unpack(head, content[head.data_start : head.data_start + head.data_size])
     except ChunkError as error:
-        return Unpacked(indexes=indexes, trouble=str(error))
-    return Unpacked(raw, indexes)
+        return OpenedPiece(indexes=indexes, error=str(error))
+    return OpenedPiece(raw, indexes)
 
 
 def indexes_of(
     block: bytes, piece: Piece, base: int | None = None, channels: Collection[int] | None = None
 ) -> dict[int, tuple[IntArray, IntArray]]:
-    """Offsets and log times of a chunk's messages by channel, as its message indexes say.
+    """Offsets and log times of a chunk's messages by channel, by its message indexes.
 
     Args:
         block: Bytes of the file.
         piece: The chunk.
-        base: Byte of the file at which `block` starts; the chunk's start where None.
-        channels: Those that are wanted; all where None.
+        base: Byte of the file at which `block` starts; None for the chunk's start.
+        channels: Wanted channels; None for all.
 
     Returns:
-        Of those indexes that stand where they should and parse.
+        Offsets and times of the message indexes that are at their place and parse.
     """
     start = piece.start if base is None else base
     found = {}

@@ -1,7 +1,7 @@
-"""Files to read from, whether they are MCAP as they are or compressed as a whole with zstd or lz4.
+"""Opening a log: plain MCAP, or with whole-file compression by zstd or lz4.
 
 A compressed file is decompressed block by block (zstd: RFC 8878, 3.1.1; lz4: LZ4 Frame Format 1.6) into a temporary
-file, so that all blocks before a cut or a damaged one are kept, and memory holds one block.
+file. All blocks before a cut or a damaged one are kept, and memory holds one block.
 """
 
 import os
@@ -21,24 +21,24 @@ from navirl_cli.logs.container.sniff import check_magic, check_path, decompresse
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 _LZ4: Final = b"\x04\x22\x4d\x18"
-#: A frame of something else (0x50 to 0x5f stand before this), which both formats allow and skip.
+#: A skippable frame, which both formats allow: these bytes after one of 0x50 to 0x5f.
 _SKIPPED: Final = b"\x2a\x4d\x18"
-#: A zstd frame may ask for 2 GB of memory; libzstd refuses more than this, which `zstd --ultra -22` asks for.
+#: A zstd frame may need 2 GB of memory; libzstd refuses more than this, which `zstd --ultra -22` needs.
 _MAX_WINDOW_BYTES: Final = 128 << 20
 _MAX_LZ4_BLOCK_BYTES: Final = 4 << 20
-#: Enough to tell what a file is.
+#: Enough to identify a file.
 _HEAD_BYTES: Final = 512
 
 
 def open_log(path: Path) -> RawFile:
-    """Open a file, and decompress it into a temporary one where it is compressed as a whole.
+    """Open a log, and decompress a compressed one into a temporary file.
 
     Args:
-        path: An MCAP file, or one in zstd or lz4 frames; what it is is told by its bytes, not by its name.
+        path: An MCAP file, or one in zstd or lz4 frames; identified by its bytes, not by its name.
 
     Raises:
-        LogError: There is no such file or it cannot be read; it holds no MCAP; nothing of it decompresses; there is no
-            room for what it decompresses to.
+        LogError: The file does not exist or cannot be read; it is not MCAP; nothing of it decompresses; there is no
+            free space for the decompressed file.
     """
     check_path(path)
     with ExitStack() as on_failure:
@@ -49,15 +49,15 @@ def open_log(path: Path) -> RawFile:
             file.seek(0)
         except OSError as error:
             raise LogError(f"{path}: expected a readable file, found: {error.strerror}; check its rights") from error
-        if kind := _compression(head):
-            return _decompressed(path, file, size, kind)
+        if compression := _compression(head):
+            return _decompressed(path, file, size, compression)
         check_magic(path, head, size)
         on_failure.pop_all()
     return RawFile(path, file, size)
 
 
 def _compression(head: bytes) -> str:
-    """What a file of these first bytes is compressed with, empty for nothing."""
+    """The compression of a file, by its first bytes; empty for none."""
     if head.startswith(_LZ4):
         return "lz4"
     return "zstd" if head.startswith(_ZSTD) or _is_skipped(head) else ""
@@ -67,95 +67,96 @@ def _is_skipped(head: bytes) -> bool:
     return head[1:4] == _SKIPPED and head[0] >> 4 == 5
 
 
-def _decompressed(path: Path, file: BinaryIO, size: int, kind: str) -> RawFile:
-    """The decompressed bytes of a file, as far as they can be had."""
+def _decompressed(path: Path, file: BinaryIO, size: int, compression: str) -> RawFile:
+    """A temporary file with the bytes that decompress."""
     damage: list[Damage] = []
     done = 0
     with ExitStack() as on_failure:
         try:
             target = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it
             on_failure.callback(_discard, target)
-            for raw in _Unpacking(path, file, size, kind, damage).blocks():
+            for raw in _Decompression(path, file, size, compression, damage).blocks():
                 target.write(raw)
                 done += len(raw)
             target.seek(0)
         except OSError as error:
             folder = tempfile.tempdir or os.environ.get("TMPDIR", "/tmp")  # noqa: S108 - where Python looks first
             raise LogError(
-                f"{path}: expected room in {folder} for what it decompresses to, found: {error.strerror} after {done} "
-                "bytes; free some, or name another folder in the environment variable TMPDIR"
+                f"{path}: expected free space in {folder} for the decompressed file, found: {error.strerror} after "
+                f"{done} bytes; free some space, or name another folder in the environment variable TMPDIR"
             ) from error
         if damage and not done:
-            raise LogError(f"{path}: expected MCAP compressed with {kind}, found: {damage[0].reason}; copy it again")
-        check_magic(path, target.read(_HEAD_BYTES), done, kind)
+            expected = f"expected MCAP compressed with {compression}"
+            raise LogError(f"{path}: {expected}, found: {damage[0].reason}; copy it again")
+        check_magic(path, target.read(_HEAD_BYTES), done, compression)
         target.seek(0)
         on_failure.pop_all()
     return RawFile(path, target, done, tuple(damage))
 
 
 def _discard(target: BinaryIO) -> None:
-    """Close a file, even where its last bytes find no room."""
+    """Close a file, even if there is no free space for its last bytes."""
     with suppress(OSError):
         target.close()
 
 
 @dataclass
-class _Unpacking:
-    """Goes over the frames of a compressed file."""
+class _Decompression:
+    """The walk over the frames of a compressed file."""
 
     path: Path
     file: BinaryIO
     size: int
-    kind: str
+    compression: str
     damage: list[Damage]
-    #: Where the piece starts that is being read, and its bytes so far.
+    #: First byte of the section of a frame that is being read, and its bytes so far.
     at: int = 0
-    piece: bytes = b""
+    section: bytes = b""
 
     def blocks(self) -> Iterator[bytes]:
-        """Yield the decompressed blocks; what ends them before their time is noted as damage."""
+        """Yield the decompressed blocks; add what cannot be decompressed to the damage."""
         while self.at < self.size:
             start, head = self.at, self._peeked()
             if _is_skipped(head):
                 self._skip()
             elif head == _ZSTD:
                 yield from self._frame(
-                    start, self._zstd_pieces(), zstandard.ZstdDecompressor().decompressobj().decompress
+                    start, self._zstd_sections(), zstandard.ZstdDecompressor().decompressobj().decompress
                 )
             elif head == _LZ4:
-                yield from self._frame(start, self._lz4_pieces(), _lz4())
+                yield from self._frame(start, self._lz4_sections(), _lz4())
             else:
-                self._stop(f"no {self.kind} frame starts here ({head.hex(' ')}); what stands here is lost")
+                self._stop(f"no {self.compression} frame starts here ({head.hex(' ')}); the rest is lost")
 
-    def _frame(self, start: int, pieces: Iterator[str], decompress: Callable[[bytes], bytes]) -> Iterator[bytes]:
-        """Yield what one frame holds."""
-        closing = False
+    def _frame(self, start: int, sections: Iterator[str], decompress: Callable[[bytes], bytes]) -> Iterator[bytes]:
+        """Yield the decompressed blocks of one frame."""
+        is_checksum = False
         try:
-            for what in pieces:
-                closing = what == "checksum"
-                raw = decompress(self.piece)
-                self.at, self.piece = self.at + len(self.piece), b""
+            for name in sections:
+                is_checksum = name == "checksum"
+                raw = decompress(self.section)
+                self.at, self.section = self.at + len(self.section), b""
                 yield raw
         except EOFError:
             with suppress(zstandard.ZstdError, RuntimeError):
-                # a block that is stored as it is can be used in part
-                yield decompress(self.piece)
-            self._stop(f"the {self.kind} compression is cut; what stood behind is lost, what stands before is read")
+                # the first bytes of a block that is stored uncompressed can be used
+                yield decompress(self.section)
+            self._stop(f"the {self.compression} data are cut off; everything before was read, the rest is lost")
         except (zstandard.ZstdError, RuntimeError) as error:
-            if not closing:
-                self._stop(f"the {self.kind} compression is damaged ({error}); what stands here and behind is lost")
+            if not is_checksum:
+                self._stop(f"the {self.compression} data are damaged ({error}); the rest is lost")
                 return
-            stop = self.at + len(self.piece)
-            reason = f"the {self.kind} checksum is wrong; some of what it decompresses to is damaged, not known where"
+            stop = self.at + len(self.section)
+            reason = f"the {self.compression} checksum is wrong; some decompressed bytes are wrong, unknown which"
             self.damage.append(Damage(self.path, start, stop, reason))
-            self.at, self.piece = stop, b""
+            self.at, self.section = stop, b""
 
-    def _zstd_pieces(self) -> Iterator[str]:
-        """Read a zstd frame into `piece`, yielding what each piece is."""
+    def _zstd_sections(self) -> Iterator[str]:
+        """Read the sections of a zstd frame into `section`, and yield their names."""
         descriptor = self._take(5)[4]
         single = descriptor >> 5 & 1
         self._take(1 - single + (0, 1, 2, 4)[descriptor & 3] + (single, 2, 4, 8)[descriptor >> 6])
-        window = zstandard.get_frame_parameters(self.piece).window_size
+        window = zstandard.get_frame_parameters(self.section).window_size
         if window > _MAX_WINDOW_BYTES:
             raise LogError(
                 f"{self.path}: expected a zstd frame with a window of at most {_MAX_WINDOW_BYTES >> 20} MiB, found "
@@ -173,8 +174,8 @@ class _Unpacking:
             self._take(4)
             yield "checksum"
 
-    def _lz4_pieces(self) -> Iterator[str]:
-        """Read an lz4 frame into `piece`, yielding what each piece is."""
+    def _lz4_sections(self) -> Iterator[str]:
+        """Read the sections of an lz4 frame into `section`, and yield their names."""
         flags = self._take(6)[4]
         self._take(1 + 8 * (flags >> 3 & 1) + 4 * (flags & 1))
         yield "head"
@@ -188,7 +189,7 @@ class _Unpacking:
 
     def _take(self, count: int) -> bytes:
         data = self._read(count)
-        self.piece += data
+        self.section += data
         if len(data) < count:
             raise EOFError
         return data
@@ -198,8 +199,8 @@ class _Unpacking:
             return self.file.read(count)
         except OSError as error:
             raise LogError(
-                f"{self.path}: expected {self.size} readable bytes, found: {error.strerror} behind byte {self.at}; "
-                "copy what can be read elsewhere"
+                f"{self.path}: expected {self.size} readable bytes, found: {error.strerror} after byte {self.at}; "
+                "copy what can be read to another disk"
             ) from error
 
     def _peeked(self) -> bytes:
@@ -209,16 +210,16 @@ class _Unpacking:
         return head
 
     def _skip(self) -> None:
-        """Step over a frame that is no data."""
+        """Step over a skippable frame."""
         self.file.seek(self.at + 4)
         stop = self.at + 8 + int.from_bytes(self._read(4), "little")
         if stop > self.size:
-            self._stop("the file ends inside a frame that holds no data; what stood behind is lost")
+            self._stop("the file ends inside a skippable frame; the rest is lost")
         else:
             self.at = stop
 
     def _stop(self, reason: str) -> None:
-        """Note damage up to the end of the file, and go there."""
+        """Add damage up to the end of the file, and go there."""
         self.damage.append(Damage(self.path, self.at, self.size, reason))
         self.at = self.size
 

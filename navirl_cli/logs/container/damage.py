@@ -1,4 +1,4 @@
-"""What could not be used of a file: where it stands, when it was recorded, and why it is lost."""
+"""The parts of a file that could not be used: their place, their time, and the reason."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -18,8 +18,8 @@ class Damage:
     stop: int
     #: What happened, and what was lost by it.
     reason: str
-    #: Time of receipt, s since the file's first message: begin and end, the end None up to the end of the file; None
-    #: where the time is not known.
+    #: Begin and end of the time of receipt, s since the file's first message; an end of None is the end of the file.
+    #: None where the time is not known.
     span_s: tuple[float, float | None] | None = None
 
     def __str__(self) -> str:
@@ -32,7 +32,7 @@ class Damage:
 
 @dataclass
 class _Entry:
-    """Damage whose time is still in ns."""
+    """Damage with its time in ns."""
 
     start: int
     stop: int
@@ -45,7 +45,7 @@ class DamageList:
 
     Args:
         path: The file's name.
-        known: Damage that is known beforehand.
+        known: Damage that is known before the walk.
     """
 
     def __init__(self, path: Path, known: Iterable[Damage] = ()) -> None:
@@ -60,16 +60,16 @@ class DamageList:
         self.lost_messages: Counter[int] = Counter()
 
     def add(self, start: int, stop: int, reason: str, span_ns: tuple[int, int | None] | None = None) -> None:
-        """Add damage of bytes [start, stop), received in `span_ns`: an end of None is the end of the file."""
+        """Add damage of bytes [start, stop) with its begin and end in ns; an end of None is the end of the file."""
         self._entries.append(_Entry(start, stop, reason, span_ns))
 
     def add_gap(self, start: int, stop: int, reason: str) -> None:
-        """Add damage that lasts from the latest message so far to the next one that is met."""
+        """Add damage that lasts from the latest message so far to the next one that the walk finds."""
         self.add(start, stop, reason, None if self._span_ns is None else (self._span_ns[1], None))
         self._open.append(self._entries[-1])
 
     def met(self, span_ns: tuple[int, int] | None) -> None:
-        """Take note of the first and last time of receipt of intact bytes, ns; None where it is not known."""
+        """Extend the file's time by the first and last time of receipt of a piece, ns; None if not known."""
         if span_ns is None:
             return
         begin, end = span_ns
@@ -81,12 +81,12 @@ class DamageList:
         self._span_ns = (min(first, begin), max(latest, end))
 
     def in_order(self) -> list[Damage]:
-        """All damage so far, by place; chunks are opened behind the walk, so that it is found in another order."""
+        """All damage so far, ordered by place; it is found in another order, because the walk runs ahead."""
         found = [*self._known, *map(self._dated, self._entries)]
         return sorted(dict.fromkeys(found), key=lambda damage: damage.start)
 
     def _dated(self, entry: _Entry) -> Damage:
-        """Damage with its time since the file's first message, wherever in the file that message stands."""
+        """Damage with its time since the file's first message, which may stand anywhere in the file."""
         span_s = None
         if entry.span_ns is not None:
             begin, end = entry.span_ns

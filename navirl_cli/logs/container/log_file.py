@@ -1,9 +1,9 @@
-"""MCAP files as batches of message payloads, however they were written and whatever happened to them.
+"""MCAP files as batches of messages, for every variant of the format and for damaged files.
 
-The survey of a file says where its messages stand. Chunks whose message indexes name no wanted channel are not opened;
-the others are read, decompressed and handed on by several threads, in the file's order. What a message index gets wrong
-is found by walking over the chunk's records; what it leaves out only the file's statistics tell, so that without them,
-as in a file that is cut, all chunks are walked over. What cannot be read is noted as `Damage`.
+The survey of a file finds where its messages stand. Chunks whose message indexes name no wanted channel are not opened.
+The others are read and decompressed by several threads and handed on in the file's order. Where a message index is
+wrong, the chunk's records are walked over. What it leaves out shows only by the file's statistics; without them, as in
+a file that is cut off, all chunks are walked over. What cannot be read is reported as `Damage`.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ import numpy as np
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Definitions
-from navirl_cli.logs.container.chunks import Piece, Unpacked
+from navirl_cli.logs.container.chunks import OpenedPiece, Piece
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage, DamageList
 from navirl_cli.logs.container.opener import Opener, Wanted
@@ -30,7 +30,7 @@ from navirl_cli.logs.container.summary import Summary, read_footer, read_header,
 from navirl_cli.logs.container.survey import Survey
 from navirl_cli.parallel import cores
 
-#: More threads than this wait for each other and for the memory.
+#: More threads only wait for each other and for memory.
 _MAX_THREADS: Final = 4
 _KEPT_BYTES: Final = 1 << 24
 
@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 def threads_here() -> int:
-    """How many threads reading uses."""
+    """Number of threads that reading uses by default."""
     return min(cores(), _MAX_THREADS)
 
 
@@ -47,19 +47,19 @@ class _Job(Generic[T]):
     """A piece that is being opened."""
 
     piece: Piece
-    #: What it holds, and the results where message indexes served.
-    outcome: "Future[tuple[Unpacked, list[T] | None]]"
+    #: What `Opener.open` returns.
+    outcome: "Future[tuple[OpenedPiece, list[T] | None]]"
 
 
 class LogFile:
     """An open MCAP file; a context manager.
 
     Args:
-        path: The file, or one that is open, which stays so.
-        trust_indexes: False to walk over every chunk, whatever message indexes say.
+        path: The file; one that is already open stays open.
+        trust_indexes: False to ignore message indexes and walk over every chunk.
 
     Raises:
-        LogError: It is no MCAP file, or ends before its header does.
+        LogError: It is not an MCAP file, or ends before the end of its header.
     """
 
     def __init__(self, path: Path | str | RawFile, *, trust_indexes: bool = True) -> None:
@@ -72,13 +72,13 @@ class LogFile:
             on_failure.callback(self._close)
             self.profile, self.library, self._data_start = read_header(self._raw)
             self._footer = read_footer(self._raw)
-            #: The summary section, None if there is none or it is damaged.
+            #: The summary section; None if it is missing or damaged.
             self.summary = self._footer and read_summary(self._raw, self._data_start, self._footer)
             on_failure.pop_all()
         self._start(trust_indexes=trust_indexes)
 
     def _start(self, *, trust_indexes: bool) -> None:
-        """Get ready for a walk; nothing is known yet but the summary."""
+        """Prepare a walk; only the summary is known yet."""
         footer, summary = self._footer, self.summary or Summary()
         self._damage = DamageList(self.path, self._raw.damage)
         self._definitions = Definitions(dict(summary.schemas), dict(summary.channels))
@@ -129,55 +129,55 @@ class LogFile:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The channels known so far: all of them after a walk, or at once with a complete summary."""
+        """The channels known so far: all of them after a walk, or from the start with a complete summary."""
         return tuple(self._definitions.channel(number) for number in sorted(self._definitions.channels))
 
     def batches(self, wanted: Wanted) -> Iterator[Batch]:
-        """Walk over the file; once, since it collects damage and metadata.
+        """Walk over the file; to be called once, because the walk collects damage and metadata.
 
         Args:
-            wanted: Says which channels' messages are wanted.
+            wanted: Whether a channel's messages are wanted.
 
         Yields:
-            Their messages, piece by piece in the file's order.
+            Batches of them, in the file's order.
         """
         return self.results(wanted, lambda batch: batch, threads=1)
 
     def results(self, wanted: Wanted, use: Callable[[Batch], T], threads: int) -> Iterator[T]:
-        """Walk over the file, and use its messages by several threads; once, as :meth:`batches`.
+        """Walk over the file with several threads; to be called once, like :meth:`batches`.
 
         Args:
-            wanted: Says which channels' messages are wanted.
-            use: What is done with each batch, in any thread.
-            threads: How many open chunks at once.
+            wanted: Whether a channel's messages are wanted.
+            use: Called with each batch, in any thread.
+            threads: Number of threads that open chunks.
 
         Yields:
-            What came out, in the file's order.
+            What `use` returned, in the file's order.
         """
-        # once a block of this size was freed, glibc keeps smaller ones in place of giving them back chunk by chunk
+        # after a block of this size was freed, glibc keeps smaller ones and does not return them after each chunk
         np.empty(_KEPT_BYTES, dtype=np.uint8)
         jobs: deque[_Job[T]] = deque()
         with ThreadPoolExecutor(threads) as pool:
             for piece in self._survey.pieces():
                 if piece is None:
-                    yield from self._all_finished(jobs, wanted, use)
+                    yield from self._all_results(jobs, wanted, use)
                     continue
-                mine = self._opener.wanted_in(piece, wanted)
-                if mine == ():
-                    self._opener.pass_by(piece)
+                channels = self._opener.wanted_in(piece, wanted)
+                if channels == ():
+                    self._opener.skip(piece)
                     continue
-                jobs.append(_Job(piece, pool.submit(self._opener.open, piece, mine, use)))
+                jobs.append(_Job(piece, pool.submit(self._opener.open, piece, channels, use)))
                 if len(jobs) > threads:
-                    yield from self._finished(jobs.popleft(), wanted, use)
-            yield from self._all_finished(jobs, wanted, use)
+                    yield from self._results(jobs.popleft(), wanted, use)
+            yield from self._all_results(jobs, wanted, use)
         self.position = self.size
         self._survey.check_data()
 
     def times(self) -> dict[int, IntArray]:
-        """Times of receipt in ns of all messages by channel, ascending, from message indexes where they can be used."""
+        """Times of receipt in ns of all messages by channel, ascending; from message indexes where possible."""
         found = self._times()
-        promised = self.summary.statistics.by_channel if self.summary and self.summary.statistics else {}
-        if self._opener.by_index and any(len(found.get(number, ())) < count for number, count in promised.items()):
+        counted = self.summary.statistics.by_channel if self.summary and self.summary.statistics else {}
+        if self._opener.by_index and any(len(found.get(number, ())) < count for number, count in counted.items()):
             self._start(trust_indexes=False)
             found = self._times()
         return found
@@ -187,33 +187,33 @@ class LogFile:
         for piece in filter(None, self._survey.pieces()):
             times = self._opener.times(piece)
             if times is None:
-                unpacked, _ = self._opener.open(piece, None, lambda batch: batch)
-                for batch in self._opener.batches(piece, unpacked, lambda _: True):
+                opened, _ = self._opener.open(piece, None, lambda batch: batch)
+                for batch in self._opener.batches(piece, opened, lambda _: True):
                     found.setdefault(batch.channel.id, []).append(batch.log_time_ns)
             else:
-                self._opener.pass_by(piece)
+                self._opener.skip(piece)
                 for number, some in times.items():
                     found.setdefault(number, []).append(some)
         joined = {number: np.sort(np.concatenate(times)) for number, times in found.items()}
         return {number: times for number, times in joined.items() if len(times)}
 
-    def _all_finished(self, jobs: deque[_Job[T]], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
-        """The results of all pieces that are being opened, after which their definitions are known."""
+    def _all_results(self, jobs: deque[_Job[T]], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
+        """Yield the results of all pieces that are being opened; their definitions are known after that."""
         while jobs:
-            yield from self._finished(jobs.popleft(), wanted, use)
+            yield from self._results(jobs.popleft(), wanted, use)
 
-    def _finished(self, job: _Job[T], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
-        """The results of a piece, in turn."""
-        unpacked, results = job.outcome.result()
+    def _results(self, job: _Job[T], wanted: Wanted, use: Callable[[Batch], T]) -> Iterator[T]:
+        """Yield the results of a piece."""
+        opened, results = job.outcome.result()
         self.position = job.piece.stop
         if results is None:
-            yield from map(use, self._opener.batches(job.piece, unpacked, wanted))
+            yield from map(use, self._opener.batches(job.piece, opened, wanted))
         else:
-            self._opener.pass_by(job.piece)
+            self._opener.skip(job.piece)
             yield from results
 
     def metadata_at(self, offset: int) -> tuple[str, dict[str, str]] | None:
-        """The metadata record at an offset of the file, None if there is none."""
+        """The metadata record at an offset of the file; None if there is another record, or none."""
         head = self._raw.read(offset, offset + HEAD_SIZE)
         try:
             code, length = records.RECORD_HEAD.unpack_from(head)

@@ -19,7 +19,7 @@ class RawFile:
 
     Args:
         path: The file's name, for messages.
-        file: The bytes, decompressed where necessary; has a file descriptor.
+        file: The bytes, decompressed if necessary; must have a file descriptor.
         size: Number of bytes.
         damage: What could not be decompressed, in bytes of the compressed file.
     """
@@ -41,14 +41,14 @@ class RawFile:
 
     def read(self, start: int, stop: int) -> bytes:
         """Bytes [start, stop), fewer where the file ends."""
-        parts, at, stop = [], start, min(stop, self.size)
-        while at < stop and (part := os.pread(self.file.fileno(), stop - at, at)):
-            parts.append(part)
-            at += len(part)
-        return parts[0] if len(parts) == 1 else b"".join(parts)
+        blocks, at, stop = [], start, min(stop, self.size)
+        while at < stop and (block := os.pread(self.file.fileno(), stop - at, at)):
+            blocks.append(block)
+            at += len(block)
+        return blocks[0] if len(blocks) == 1 else b"".join(blocks)
 
     def peek(self, start: int, stop: int) -> bytes:
-        """A few bytes; those behind them are read ahead. For one thread at a time."""
+        """A few bytes; those after them are read ahead. For one thread at a time."""
         at, ahead = self._ahead
         if not at <= start <= stop <= at + len(ahead):
             at, ahead = start, self.read(start, max(stop, start + _AHEAD))

@@ -1,6 +1,6 @@
 """MCAP records: their codes and their contents, parsed from bytes.
 
-Source: the MCAP file format specification, https://mcap.dev/spec. Only what reading needs is kept of each record.
+Source: the MCAP file format specification, https://mcap.dev/spec. Of each record only what reading needs is kept.
 """
 
 import struct
@@ -28,17 +28,17 @@ METADATA: Final = 0x0C
 METADATA_INDEX: Final = 0x0D
 SUMMARY_OFFSET: Final = 0x0E
 DATA_END: Final = 0x0F
-#: Codes from here on are free for private use: skipped, never an error.
+#: Codes from here on are for private use; such records are skipped and never an error.
 PRIVATE: Final = 0x80
 
 #: Bytes of a record's code and length.
 HEAD_SIZE: Final = 9
 #: Bytes from the start of a message record to its payload.
 MESSAGE_HEAD_SIZE: Final = 31
-#: Bytes of footer record and magic, which close every complete file.
+#: Bytes of the footer record and the magic at the end of every complete file.
 TAIL_SIZE: Final = HEAD_SIZE + 20 + len(MAGIC)
 
-#: What a parser raises on contents that are no such record.
+#: What the parsers raise on malformed contents.
 MALFORMED: Final = (struct.error, ValueError)
 
 RECORD_HEAD: Final = struct.Struct("<BQ")
@@ -74,7 +74,7 @@ class ChannelRecord(NamedTuple):
 
 
 class ChunkHead(NamedTuple):
-    """What stands before a chunk's compressed bytes; times are of the first and the last message in ns."""
+    """The fields before a chunk's compressed bytes; times are those of the first and the last message, ns."""
 
     start_ns: int
     end_ns: int
@@ -98,7 +98,7 @@ class ChunkIndex(NamedTuple):
 
     @property
     def stop(self) -> int:
-        """First byte behind the chunk and its message indexes."""
+        """First byte after the chunk and its message indexes."""
         return self.start + self.length + self.message_index_length
 
 
@@ -115,7 +115,7 @@ class Statistics(NamedTuple):
 
 
 class Footer(NamedTuple):
-    """Where the summary section starts (0: none) and its CRC (0: none)."""
+    """First byte of the summary section and its CRC; 0 where the file has none."""
 
     summary_start: int
     summary_crc: int
@@ -123,7 +123,7 @@ class Footer(NamedTuple):
 
 @dataclass
 class _Cursor:
-    """Reads one value after the other from a record's contents."""
+    """Reads the values of a record's contents one by one."""
 
     data: bytes | memoryview
     at: int = 0
@@ -137,7 +137,7 @@ class _Cursor:
         return self.blob().decode()
 
     def name(self) -> str:
-        """A text of one line: what cannot be printed is escaped."""
+        """A text on one line; characters that cannot be printed are escaped."""
         text = self.string()
         return text if text.isprintable() else "".join(map(_printable, text))
 
@@ -163,7 +163,7 @@ def parse_header(content: bytes) -> tuple[str, str]:
 
 
 def parse_schema(content: bytes) -> SchemaRecord:
-    """A schema record; bytes of its text that are no UTF-8 (comments, mostly) are replaced."""
+    """A schema record; bytes of its text that are not UTF-8 (mostly in comments) are replaced."""
     cursor = _Cursor(content)
     (schema_id,) = cursor.take("<H")
     return SchemaRecord(schema_id, cursor.name(), cursor.name(), cursor.blob().decode(errors="replace"))
@@ -226,7 +226,7 @@ def parse_footer(content: bytes) -> Footer:
 
 
 def parse_data_end(content: bytes) -> int:
-    """CRC of all bytes before the data end record; 0 where there is none."""
+    """CRC of all bytes before the data end record; 0 if the recorder wrote none."""
     (crc,) = _Cursor(content).take("<I")
     return crc
 
@@ -235,7 +235,7 @@ def parse_message_index(content: bytes) -> tuple[int, IntArray, IntArray]:
     """Channel, and offsets in the uncompressed chunk (ascending) and log times in ns of its messages, shape (n,).
 
     Raises:
-        struct.error, ValueError: The contents are no such record, or name a message twice.
+        struct.error, ValueError: The contents are malformed, or name a message twice.
     """
     cursor = _Cursor(content)
     (channel,) = cursor.take("<H")
@@ -253,18 +253,18 @@ def parse_message_index(content: bytes) -> tuple[int, IntArray, IntArray]:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a walk over records in a buffer met."""
+class FoundRecords:
+    """The records that a walk over a buffer found."""
 
     #: Offsets of the message records, by channel id, ascending.
     messages: dict[int, list[int]]
-    #: Code, first and last byte + 1 of the contents of schema and channel records.
+    #: Of each schema and channel record: its code, first byte of its contents, first byte after them.
     definitions: list[tuple[int, int, int]]
-    #: Offset at which the walk stopped: the buffer's size, or the first record that is cut or none of the three.
+    #: Where the walk stopped: at the end of the buffer, at a record that is cut, or at one of another type.
     stop: int
 
 
-def walk(data: bytes | memoryview, limit: int, at: int = 0) -> Found:
+def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
     """Hop from record to record over messages, schemas and channels.
 
     Args:
@@ -273,7 +273,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> Found:
         at: Where the first record starts.
 
     Returns:
-        What was found; `stop` is smaller than `limit` if a record is cut or of another kind.
+        The records; `stop` is smaller than `limit` if a record is cut or of another type.
     """
     messages: dict[int, list[int]] = {}
     definitions: list[tuple[int, int, int]] = []
@@ -295,4 +295,4 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> Found:
                 break
             definitions.append((code, at + HEAD_SIZE, at + HEAD_SIZE + length))
         at += HEAD_SIZE + length
-    return Found(messages, definitions, at)
+    return FoundRecords(messages, definitions, at)

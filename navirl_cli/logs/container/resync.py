@@ -1,4 +1,4 @@
-"""Where records start again behind damage: by what a chunk or a message record must look like."""
+"""Where records start again after damage, found by what a chunk or a message record must look like."""
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
@@ -9,15 +9,15 @@ import numpy as np
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.chunks import COMPRESSIONS, MAX_CHUNK_BYTES
-from navirl_cli.logs.container.records import HEAD_SIZE, Found
+from navirl_cli.logs.container.records import HEAD_SIZE, FoundRecords
 
-#: Bytes searched at once, first and at most: where there are many holes each is small.
+#: Bytes searched at once, first and at most: where there are many gaps, each is small.
 _FIRST, _BLOCK = 1 << 12, 1 << 20
-#: How many of them overlap: the longest head that is looked at.
+#: Overlap of two blocks, bytes: the longest header that is looked at.
 _OVERLAP: Final = 128
-#: Bytes of a chunk's head beside the compression's name.
+#: Bytes of a chunk's header without the compression's name.
 _CHUNK_HEAD: Final = 40
-#: What may stand in the data section.
+#: Records of the data section.
 _DATA_CODES: Final = frozenset(
     {
         records.SCHEMA,
@@ -31,17 +31,17 @@ _DATA_CODES: Final = frozenset(
     }
 )
 
-#: Bytes [start, stop) of something, fewer where it ends.
+#: Returns bytes [start, stop) of a file or chunk, fewer at its end.
 Peek = Callable[[int, int], bytes]
 
 
 def starts_record(peek: Peek, at: int, size: int) -> bool:
-    """Whether a record of the data section can start at a byte, or the data end there.
+    """Whether a record of the data section can start at a byte, or the data can end there.
 
     Args:
-        peek: Gives bytes.
+        peek: Returns bytes.
         at: The byte.
-        size: Number of bytes that there are.
+        size: Number of all bytes.
     """
     if at == size:
         return True
@@ -53,22 +53,22 @@ def starts_record(peek: Peek, at: int, size: int) -> bool:
 
 
 def next_record(peek: Peek, at: int, size: int, channels: AbstractSet[int]) -> int | None:
-    """Find the next chunk, or message of a known channel.
+    """Find the next chunk, or the next message of a known channel.
 
     Args:
-        peek: Gives bytes.
+        peek: Returns bytes.
         at: Where the search starts.
-        size: Number of bytes that there are.
-        channels: Ids of known channels; where it is empty only chunks are found.
+        size: Number of all bytes.
+        channels: Ids of known channels; if it is empty, only chunks are found.
 
     Returns:
-        Where it starts: a head whose lengths agree and behind whose record another can start, or None.
+        Where it starts: the lengths in its header agree, and another record can start after it. None if not found.
     """
     length = _FIRST
     while at < size - HEAD_SIZE:
         block = peek(at, min(size, at + length))
         for candidate in _candidates(block).tolist():
-            if _convinces(peek, at + candidate, size, channels):
+            if _is_record(peek, at + candidate, size, channels):
                 return int(at + candidate)
         if at + len(block) >= size or len(block) <= _OVERLAP:
             return None
@@ -77,30 +77,30 @@ def next_record(peek: Peek, at: int, size: int, channels: AbstractSet[int]) -> i
     return None
 
 
-def walk_on(data: bytes | memoryview, channels: AbstractSet[int]) -> tuple[Found, list[tuple[int, int]]]:
-    """Walk over the records of a chunk, and go on behind damage.
+def walk_over_gaps(data: bytes | memoryview, channels: AbstractSet[int]) -> tuple[FoundRecords, list[tuple[int, int]]]:
+    """Walk over the records of a chunk, and go on after damage.
 
     Args:
         data: The chunk's records.
-        channels: Ids of known channels; those that are met on the way count too.
+        channels: Ids of known channels; those of messages found before the damage are added.
 
     Returns:
-        What was found, and the bytes [start, stop) that hold no records.
+        The records, and the bytes [start, stop) that hold none.
     """
     size = len(data)
     found = records.walk(data, size)
-    holes: list[tuple[int, int]] = []
+    gaps: list[tuple[int, int]] = []
     while found.stop < size:
         known = found.messages.keys() | channels
         again = next_record(lambda start, stop: bytes(data[start:stop]), found.stop + 1, size, known)
-        holes.append((found.stop, size if again is None else again))
+        gaps.append((found.stop, size if again is None else again))
         if again is None:
             break
         more = records.walk(data, size, again)
         for channel, offsets in more.messages.items():
             found.messages.setdefault(channel, []).extend(offsets)
-        found = Found(found.messages, [*found.definitions, *more.definitions], more.stop)
-    return found, holes
+        found = FoundRecords(found.messages, [*found.definitions, *more.definitions], more.stop)
+    return found, gaps
 
 
 def _candidates(block: bytes) -> IntArray:
@@ -113,14 +113,14 @@ def _candidates(block: bytes) -> IntArray:
     return np.flatnonzero(fits)
 
 
-def _convinces(peek: Peek, at: int, size: int, channels: AbstractSet[int]) -> bool:
-    """Whether the record that could start there is one."""
+def _is_record(peek: Peek, at: int, size: int, channels: AbstractSet[int]) -> bool:
+    """Whether the bytes at a candidate are a chunk or message record."""
     code, length = records.RECORD_HEAD.unpack(peek(at, at + HEAD_SIZE))
     stop = at + HEAD_SIZE + length
     if code == records.MESSAGE:
         channel = int.from_bytes(peek(at + HEAD_SIZE, at + HEAD_SIZE + 2), "little")
-        whole = length >= records.MESSAGE_HEAD_SIZE - HEAD_SIZE and channel in channels
-        return whole and stop <= size and starts_record(peek, stop, size)
+        complete = length >= records.MESSAGE_HEAD_SIZE - HEAD_SIZE and channel in channels
+        return complete and stop <= size and starts_record(peek, stop, size)
     try:
         head = records.parse_chunk_head(peek(at + HEAD_SIZE, at + HEAD_SIZE + _CHUNK_HEAD + 8))
     except records.MALFORMED:

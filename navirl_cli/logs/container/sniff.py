@@ -1,4 +1,4 @@
-"""What a file is that is no MCAP file, and what to do with it."""
+"""Identification of files that are not MCAP, with a remedy."""
 
 import stat
 from pathlib import Path
@@ -6,9 +6,9 @@ from pathlib import Path
 from navirl_cli.errors import LogError
 from navirl_cli.logs.container.records import MAGIC
 
-#: The command that makes an MCAP bag of another one.
+#: The command that converts another bag to MCAP.
 CONVERT = "rosbags-convert --src {path} --dst {stem}_mcap --dst-storage mcap"
-#: First bytes, what such a file is, the remedy.
+#: First bytes of a file, its format, the remedy.
 _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"#ROSBAG V", "a ROS 1 bag", "convert it: " + CONVERT),
     (
@@ -16,21 +16,21 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
         "a ROS 2 bag in SQLite",
         "convert its folder, metadata.yaml included: " + CONVERT.replace("{path}", "{dir}"),
     ),
-    (b"\x1f\x8b", "a file compressed as a whole with gzip", "decompress it first: gzip -dk {path}"),
+    (b"\x1f\x8b", "a file compressed with gzip", "decompress it first: gzip -dk {path}"),
     (b"PK\x03\x04", "a zip archive", "unpack it first: unzip {path}"),
 )
 
 
 def check_path(path: Path) -> None:
-    """Refuse what is no file.
+    """Refuse a path that is not a file.
 
     Raises:
-        LogError: The path does not exist, cannot be looked at, or is a folder or a pipe.
+        LogError: The path does not exist or is not accessible, or it is a folder, a pipe or a device.
     """
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise LogError(f"{path}: expected an MCAP file, found nothing there; check the path") from error
+        raise LogError(f"{path}: expected an MCAP file, found no file there; check the path") from error
     except OSError as error:
         raise LogError(f"{path}: expected an MCAP file, found: {error.strerror}; check path and rights") from error
     if stat.S_ISDIR(mode):
@@ -38,22 +38,22 @@ def check_path(path: Path) -> None:
         listing = f"it holds {', '.join(found)}" if found else "it holds no .mcap file"
         raise LogError(f"{path}: expected an MCAP file, found a folder ({listing}); give the .mcap files in it")
     if not stat.S_ISREG(mode):
-        raise LogError(f"{path}: expected an MCAP file, found a pipe or a device; write it into a file first")
+        raise LogError(f"{path}: expected an MCAP file, found a pipe or a device; save its bytes to a file first")
 
 
 def check_magic(path: Path, head: bytes, size: int, inside: str = "") -> None:
-    """Refuse what does not start like an MCAP file.
+    """Refuse a file that does not start like MCAP.
 
     Args:
         path: The file.
         head: Its first bytes.
         size: Its size in bytes.
-        inside: The compression, zstd or lz4, in which these bytes stood in the file; none if empty.
+        inside: The whole-file compression, zstd or lz4, from which these bytes come; empty for none.
 
     Raises:
-        LogError: Names what the file is and what to do with it.
+        LogError: The file is not MCAP; the message names its format and the remedy.
     """
-    where = f" inside of its {inside} compression" if inside else ""
+    where = f" inside the {inside} compression" if inside else ""
     if size == 0:
         raise LogError(f"{path}: expected an MCAP file{where}, found an empty file; record or copy it again")
     if head.startswith(MAGIC):
@@ -67,23 +67,23 @@ def check_magic(path: Path, head: bytes, size: int, inside: str = "") -> None:
 
 
 def decompressed_name(path: Path) -> Path:
-    """A name beside a file for what it decompresses to."""
-    packed = path.suffix in {".zstd", ".zst", ".lz4"}
-    return path.with_suffix("") if packed else path.with_name(f"decompressed_{path.name}")
+    """A name for the decompressed file, in the same folder."""
+    compressed = path.suffix in {".zstd", ".zst", ".lz4"}
+    return path.with_suffix("") if compressed else path.with_name(f"decompressed_{path.name}")
 
 
 def _describe(path: Path, head: bytes, inside: str) -> str:
-    """What the file is, and the remedy."""
+    """The format of the file, and the remedy."""
     for start, name, remedy in _KNOWN:
         if head.startswith(start):
             plain = decompressed_name(path) if inside else path
             first = f"run {inside} -d {path} {'-o ' * (inside == 'zstd')}{plain}, then " if inside else ""
             return f"{name}; {first}{remedy.format(path=plain, stem=plain.stem, dir=path.parent)}"
     if MAGIC.startswith(head):
-        return f"its first {len(head)} bytes only; nothing was recorded: record or copy it again"
+        return f"only its first {len(head)} bytes; nothing was recorded: record or copy it again"
     remedy = "give an .mcap file"
     if not head.strip(b"\0"):
-        return f"zero bytes; the file was lost when the disk or the power failed: {remedy}"
+        return f"zero bytes only (power or disk failure); {remedy}"
     if _is_text(head):
         first = head.decode(errors="ignore").lstrip()[:1]
         return f"{'JSON' if first in {'{', '['} else 'text'}; {remedy}"
@@ -91,6 +91,6 @@ def _describe(path: Path, head: bytes, inside: str) -> str:
 
 
 def _is_text(head: bytes) -> bool:
-    """Whether the bytes are printable text; a character cut at their end does not matter."""
+    """Whether the bytes are printable text; the last character may be cut."""
     text = head.decode(errors="ignore")
     return len(text.encode()) >= len(head) - 3 and all(char.isprintable() or char in "\r\n\t" for char in text)

@@ -10,8 +10,8 @@ from navirl_cli.logs.container import records
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.container.records import ChannelRecord, ChunkIndex, Footer, SchemaRecord, Statistics
 
-#: What the summary section starts with.
-_SUMMARY: Final = frozenset(
+#: Records that may follow the data section.
+_AFTER_DATA: Final = frozenset(
     {
         records.SCHEMA,
         records.CHANNEL,
@@ -29,7 +29,7 @@ _FOOTER_SIZE: Final = 20
 
 @dataclass
 class Summary:
-    """What a sound summary section says; empty where it says nothing."""
+    """The records of an intact summary section; empty where it has none."""
 
     schemas: dict[int, SchemaRecord] = field(default_factory=dict)
     channels: dict[int, ChannelRecord] = field(default_factory=dict)
@@ -38,10 +38,10 @@ class Summary:
     statistics: Statistics | None = None
 
     def add(self, code: int, content: bytes) -> None:
-        """Take up one record of the section.
+        """Add a record of the section.
 
         Raises:
-            struct.error, ValueError: The contents are no such record (`records.MALFORMED`).
+            struct.error, ValueError: The contents are malformed (`records.MALFORMED`).
         """
         if code == records.SCHEMA:
             schema = records.parse_schema(content)
@@ -56,19 +56,19 @@ class Summary:
             self.metadata_offsets.append(records.parse_metadata_index(content))
         elif code == records.STATISTICS:
             statistics = records.parse_statistics(content)
-            # where counts by channel are left out, or do not add up, nothing can be told from them
+            # counts by channel that are missing or do not add up are of no use
             if sum(statistics.by_channel.values()) == statistics.messages:
                 self.statistics = statistics
 
 
 def read_header(raw: RawFile) -> tuple[str, str, int]:
-    """Profile, library and the first byte behind the header.
+    """Profile, library and the first byte after the header.
 
     Args:
         raw: A file that starts with MCAP's magic.
 
     Raises:
-        LogError: No header stands behind the magic.
+        LogError: No header follows the magic.
     """
     path, size, start = raw.path, raw.size, len(records.MAGIC) + records.HEAD_SIZE
     head = raw.read(0, start)
@@ -99,7 +99,7 @@ def read_footer(raw: RawFile) -> Footer | None:
         raw: An MCAP file.
 
     Returns:
-        The footer, or None where the file ends otherwise: its recorder was stopped, or its end was lost.
+        The footer; None where the file does not end with one, because its recorder was stopped or its end was lost.
     """
     tail = raw.read(max(0, raw.size - records.TAIL_SIZE), raw.size)
     if len(tail) < records.TAIL_SIZE or not tail.endswith(records.MAGIC):
@@ -111,16 +111,16 @@ def read_footer(raw: RawFile) -> Footer | None:
 
 
 def read_summary(raw: RawFile, data_start: int, footer: Footer) -> Summary | None:
-    """Read the summary section if it is there and sound.
+    """Read the summary section if it is there and intact.
 
     Args:
         raw: An MCAP file.
-        data_start: First byte behind the header.
+        data_start: First byte after the header.
         footer: The file's footer.
 
     Returns:
-        The summary, or None if there is none, its CRC is wrong, a record does not parse, or chunks stand outside of the
-        data or in each other.
+        The summary; None if it is missing, its CRC is wrong, a record does not parse, or chunks overlap or lie outside
+        of the data.
     """
     end = raw.size - records.TAIL_SIZE
     if not data_start <= footer.summary_start <= end:
@@ -139,18 +139,18 @@ def read_summary(raw: RawFile, data_start: int, footer: Footer) -> Summary | Non
             summary.add(code, data[at - length : at])
     except records.MALFORMED:
         return None
-    # a channel is of no use without its schema, which stands in a chunk
+    # a channel without its schema is of no use; the chunks define both
     for number, channel in list(summary.channels.items()):
         if channel.schema_id and channel.schema_id not in summary.schemas:
             del summary.channels[number]
-    # each chunk stands in the data section, behind the one before
+    # each chunk lies in the data section, after the one before
     starts = [*sorted(summary.chunks), footer.summary_start]
     fits = all(start < summary.chunks[start].stop <= following for start, following in pairwise(starts))
     return summary if fits and starts[0] >= data_start else None
 
 
 def ends_data(raw: RawFile, footer: Footer | None, at: int) -> bool:
-    """Whether the record that starts at a byte ends the data section: damage can look like one.
+    """Whether the record that starts at a byte ends the data section; damage can look like such a record.
 
     Args:
         raw: The file's bytes.
@@ -165,6 +165,6 @@ def ends_data(raw: RawFile, footer: Footer | None, at: int) -> bool:
             code == records.DATA_END and stop == (footer.summary_start or tail)
         )
     if code == records.DATA_END and length == _DATA_END_SIZE:
-        behind = raw.peek(stop, stop + 1)
-        return not behind or behind[0] in _SUMMARY
+        following = raw.peek(stop, stop + 1)
+        return not following or following[0] in _AFTER_DATA
     return bool(code == records.FOOTER and length == _FOOTER_SIZE)

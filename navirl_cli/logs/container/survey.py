@@ -1,8 +1,8 @@
-"""The walk over a file's records, without opening its chunks: where messages stand, and what is damaged.
+"""The walk over a file's records that does not open chunks: where messages stand, and what is damaged.
 
-Where the summary names a chunk it is taken from there; else the heads of the chunk and of the message indexes behind it
-are read. Behind damage the walk goes on at the next chunk that the summary names, else at the next bytes that can only
-be a chunk or a message.
+A chunk that the summary names is taken from there; of other chunks and the message indexes after them the first fields
+are read. After damage the walk goes on at the next chunk that the summary names. Without one, it goes on at the next
+bytes that can only be a chunk or a message.
 """
 
 import struct
@@ -20,18 +20,19 @@ from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, ChunkIndex, 
 from navirl_cli.logs.container.resync import next_record, starts_record
 from navirl_cli.logs.container.summary import ends_data
 
-_RUN: Final = frozenset({records.SCHEMA, records.CHANNEL, records.MESSAGE})
-#: Bytes read at first behind damage.
-_BEHIND: Final = 1 << 12
+#: Records that may stand outside of chunks as well as in them.
+_UNCHUNKED: Final = frozenset({records.SCHEMA, records.CHANNEL, records.MESSAGE})
+#: Bytes read at first after damage.
+_AFTER_DAMAGE: Final = 1 << 12
 #: Bytes of a chunk record's contents before its compressed bytes, at most.
 _CHUNK_HEAD: Final = 64
-#: Records that are hopped over, if what follows them is a record.
+#: Records that are skipped, if another record follows them.
 _SKIPPED: Final = frozenset({records.MESSAGE_INDEX, records.ATTACHMENT, records.METADATA})
 _LOG_TIME: Final = struct.Struct("<Q")
 
 
 class _BrokenError(Exception):
-    """No usable record starts at a byte; the message says why."""
+    """No usable record starts at a byte; the message gives the reason."""
 
 
 class Survey:
@@ -39,12 +40,12 @@ class Survey:
 
     Args:
         raw: Its bytes.
-        data_start: First byte behind the header.
-        chunks: Those that an intact summary names, by their first byte.
+        data_start: First byte after the header.
+        chunks: The chunks that an intact summary names, by their first byte.
         footer: None where the file does not end as it should.
-        definitions: The channels known so far; whoever opens the pieces adds what is defined in them.
+        definitions: The channels known so far; whoever opens the pieces adds those that they define.
         damage: Where damage is added.
-        summary_lost: Whether there is a summary that cannot be used.
+        summary_lost: Whether the file has a summary that cannot be used.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Survey:
     ) -> None:
         #: Metadata records met so far, in the file's order.
         self.metadata: list[tuple[str, dict[str, str]]] = []
-        #: CRC of all bytes before the end of the data, and where that is; None where the file has none.
+        #: CRC of all bytes before the end of the data, and where that is; None if the file has no CRC.
         self._data_crc: tuple[int, int] | None = None
         self._summary_lost = summary_lost
         self._raw = raw
@@ -70,17 +71,17 @@ class Survey:
         self._footer = footer
         self._definitions = definitions
         self._damage = damage
-        #: Bytes to read at once where messages stand outside of chunks: few behind damage, where there may be more.
+        #: Bytes to read at once outside of chunks: few after damage, because more damage may follow.
         self._block = BLOCK
-        #: Whether chunks are compressed: what looks like a message outside of them is none.
+        #: Whether chunks are compressed. If so, bytes outside of chunks that look like a message are not one.
         self._compressed = any(chunk.compression for chunk in chunks.values())
 
     def pieces(self) -> Iterator[Piece | None]:
         """Walk over the file.
 
         Yields:
-            The pieces that hold messages, in the file's order; None behind damage where the definitions in all pieces
-            before must be known, because a message record is recognised by its channel.
+            The pieces that hold messages, in the file's order. After damage it yields None where the definitions of all
+            pieces before must be known, because a message record is recognised by its channel.
         """
         at: int | None = self._data_start
         count = 0
@@ -101,36 +102,36 @@ class Survey:
             at = following
         if at is not None:
             size = self._raw.size
-            self._damage.add(size, size, "the file ends without its closing records; all that it holds was read")
+            self._damage.add(size, size, "the file ends without its closing records; everything in it was read")
 
     def check_data(self) -> None:
-        """Check the CRC of the data section where one was met."""
+        """Check the CRC of the data section, if the walk found one."""
         expected, stop = self._data_crc or (0, 0)
         if expected and (crc := self._raw.crc(stop)) != expected:
             self._damage.add(
                 0,
                 stop,
-                f"the CRC of the data section is {crc:#010x}, expected {expected:#010x}: bytes have changed, and a "
-                "message that reads well may be wrong",
+                f"the CRC of the data section is {crc:#010x}, expected {expected:#010x}: some bytes have "
+                "changed, so values that look valid may be wrong",
             )
 
-    def _next_named(self, at: int) -> int | None:
-        """Where the next chunk starts that the summary names."""
+    def _next_indexed(self, at: int) -> int | None:
+        """Where the next chunk that the summary names starts."""
         number = bisect_right(self._starts, at)
         return self._starts[number] if number < len(self._starts) else None
 
     def _next(self, at: int) -> tuple[Piece | None, int | None]:
-        """The piece that starts at a byte, if one does, and where the walk goes on: None at the end of the data."""
+        """The piece that starts at a byte, if any, and where the walk goes on: None at the end of the data."""
         index = self._chunks.get(at)
-        return self._record(at) if index is None or self._headless(index) else (self._named(index), index.stop)
+        return self._record(at) if index is None or self._lacks_head(index) else (self._indexed(index), index.stop)
 
-    def _named(self, index: ChunkIndex) -> Piece:
+    def _indexed(self, index: ChunkIndex) -> Piece:
         """A chunk of the summary."""
         span = (index.start_ns, index.end_ns) if index.end_ns else None
         return Piece(0, index.start, index.stop, index.length, index.message_indexes, span)
 
-    def _headless(self, index: ChunkIndex) -> bool:
-        """Whether a chunk has lost its head, and is not compressed: its messages can be found without it."""
+    def _lacks_head(self, index: ChunkIndex) -> bool:
+        """Whether a chunk is not compressed and its header is damaged: its messages are found without the header."""
         if index.compression:
             return False
         try:
@@ -143,48 +144,48 @@ class Survey:
         return records.parse_chunk_head(self._raw.peek(at + HEAD_SIZE, min(limit, at + HEAD_SIZE + _CHUNK_HEAD)))
 
     def _record(self, at: int) -> tuple[Piece | None, int | None]:
-        """The record that starts there: its piece, if it is one, and where the walk goes on."""
+        """Read the record that starts at a byte; return as `_next` does."""
         head = self._raw.peek(at, at + HEAD_SIZE)
         if len(head) < HEAD_SIZE:
             raise _BrokenError("the file ends inside a record")
         code, length = records.RECORD_HEAD.unpack_from(head)
-        stop, limit = at + HEAD_SIZE + length, self._next_named(at) or self._raw.size
+        stop, limit = at + HEAD_SIZE + length, self._next_indexed(at) or self._raw.size
         if ends_data(self._raw, self._footer, at):
             self._close(at, code)
             return None, None
         if code == records.CHUNK:
             return self._chunk(at, length, limit)
         self._check(code, stop, limit)
-        if code in _RUN:
-            return self._run(at, stop, limit if code == records.MESSAGE else stop)
+        if code in _UNCHUNKED:
+            return self._unchunked(at, stop, limit if code == records.MESSAGE else stop)
         if code == records.METADATA:
             self._take_metadata(at, stop)
         return None, stop
 
-    def _run(self, at: int, stop: int, limit: int) -> tuple[Piece | None, int | None]:
+    def _unchunked(self, at: int, stop: int, limit: int) -> tuple[Piece | None, int | None]:
         """Messages, schemas and channels that stand outside of chunks."""
         data = self._raw.read(at, min(limit, max(stop, at + self._block)))
         self._block = min(4 * self._block, BLOCK)
         found = records.walk(data, len(data))
         if found.stop == 0:
-            raise _BrokenError("a message record is shorter than its head")
+            raise _BrokenError("a message record is shorter than its header")
         offsets = [offset for offsets in found.messages.values() for offset in (offsets[0], offsets[-1])]
         times = [_LOG_TIME.unpack_from(data, offset + 15)[0] for offset in offsets]
         span = (min(times), max(times)) if times else None
-        return Piece(0, at, at + found.stop, span_ns=span, loose=(data, found)), at + found.stop
+        return Piece(0, at, at + found.stop, span_ns=span, unchunked=(data, found)), at + found.stop
 
     def _chunk(self, at: int, length: int, limit: int) -> tuple[Piece | None, int | None]:
-        """A chunk that no summary names, with the message indexes behind it."""
+        """A chunk that no summary names, with the message indexes after it."""
         try:
             head = self._chunk_head(at, limit)
         except records.MALFORMED:
             cut = limit == self._raw.size < at + HEAD_SIZE + _CHUNK_HEAD
             raise _BrokenError(
-                "the file ends inside a chunk's head" if cut else "the chunk's head does not parse"
+                "the file ends inside a chunk's header" if cut else "the chunk's header does not parse"
             ) from None
         size = self._chunk_size(at, length, head, limit)
         if size is None:
-            raise _BrokenError(f"a chunk record of {length} bytes claims {head.data_size} bytes of contents")
+            raise _BrokenError(f"a chunk record of {length} bytes claims {head.data_size} bytes of data")
         self._compressed |= bool(head.compression)
         span = (head.start_ns, head.end_ns) if head.end_ns else None
         stop = at + HEAD_SIZE + size
@@ -194,7 +195,7 @@ class Survey:
                 at,
                 limit,
                 f"the file ends inside a chunk ({there} of {size} bytes are there); the messages before the "
-                "cut were read, those behind it are lost",
+                "cut were read, those after it are lost",
                 span,
             )
             return Piece(0, at, limit, limit - at, span_ns=span, cut=True), None if limit == self._raw.size else limit
@@ -202,7 +203,7 @@ class Survey:
         return Piece(0, at, end, stop - at, indexes, span), end
 
     def _indexes(self, at: int, limit: int) -> tuple[dict[int, int], int]:
-        """The message indexes that start there, by channel, and the first byte behind them."""
+        """The message indexes that start at a byte, by channel, and the first byte after them."""
         found: dict[int, int] = {}
         while starts_record(self._raw.peek, at, limit):
             head = self._raw.peek(at, min(limit, at + HEAD_SIZE + 2))
@@ -210,14 +211,14 @@ class Survey:
                 return found, at
             found[int.from_bytes(head[HEAD_SIZE:], "little")] = at
             at += HEAD_SIZE + int(records.RECORD_HEAD.unpack_from(head)[1])
-        # what is cut or garbled may have been the index of any channel
+        # the index that is cut or damaged may be that of any channel
         return {}, at
 
     def _chunk_size(self, at: int, length: int, head: ChunkHead, limit: int) -> int | None:
-        """Bytes of a chunk's contents, by its record's length or, where that is wrong, by its own head."""
+        """Bytes of a chunk's contents, by its record's length or, where that is wrong, by its own header."""
         own = head.data_start + head.data_size
         if length == own:
-            return length  # if anything else is wrong, it is told when the chunk is opened
+            return length  # other faults are reported when the chunk is opened
         if head.compression not in COMPRESSIONS or max(own, head.size) > MAX_CHUNK_BYTES:
             return None
         return own if starts_record(self._raw.peek, at + HEAD_SIZE + own, limit) else None
@@ -229,24 +230,25 @@ class Survey:
             self._damage.add(at, stop, f"a metadata record does not parse: {error}")
 
     def _check(self, code: int, stop: int, limit: int) -> None:
-        """Refuse a record that ends at `stop` and can neither be used nor hopped over."""
+        """Refuse a record that ends at `stop` and can neither be used nor skipped."""
         if code == 0:
-            raise _BrokenError("zero bytes where a record should start (the power or the disk failed)")
-        known = code in _RUN or code in _SKIPPED or code >= records.PRIVATE
-        if not known or stop > limit + self._raw.size:  # no cut loses more than half of a file within one record
+            raise _BrokenError("zero bytes where a record should start (power or disk failure)")
+        known = code in _UNCHUNKED or code in _SKIPPED or code >= records.PRIVATE
+        # a record that would end so far beyond the file is not one that was cut off
+        if not known or stop > limit + self._raw.size:
             raise _BrokenError(f"no record starts here (code {code:#04x})")
         if stop > limit:
             raise _BrokenError(f"the file ends inside a record (code {code:#04x}), {stop - limit} bytes before its end")
-        if code not in _RUN and stop != limit and not starts_record(self._raw.peek, stop, self._raw.size):
+        if code not in _UNCHUNKED and stop != limit and not starts_record(self._raw.peek, stop, self._raw.size):
             raise _BrokenError(f"no record follows the one that starts here (code {code:#04x})")
 
     def _close(self, at: int, code: int) -> None:
         """Check the record that ends the data: what follows is the summary section."""
-        if self._next_named(at) is not None:
-            raise _BrokenError("a closing record stands before the last chunk")
+        if self._next_indexed(at) is not None:
+            raise _BrokenError("a closing record comes before the last chunk")
         end = self._footer
         if code == records.FOOTER:
-            self._damage.add(at, at, "the record that ends the data is missing; messages may have stood before it")
+            self._damage.add(at, at, "the record that ends the data is missing; messages before it may be missing, too")
         elif end is None:
             self._damage.add(at, self._raw.size, "the file ends inside its closing records; no message is lost")
         elif self._summary_lost:
@@ -256,13 +258,13 @@ class Survey:
             self._data_crc = (crc, at)
 
     def _resume(self, at: int, reason: str) -> int | None:
-        """Add damage up to where records start again, or up to the end of the file; return where that is, if it is."""
-        named = self._next_named(at)
+        """Add damage up to the next record, or up to the end of the file; return where that record starts."""
+        indexed = self._next_indexed(at)
         end = self._footer.summary_start if self._footer and self._footer.summary_start > at else self._raw.size
         channels = frozenset() if self._compressed else self._definitions.channels.keys()
-        following = next_record(self._raw.peek, at + 1, named or end, channels) or named
+        following = next_record(self._raw.peek, at + 1, indexed or end, channels) or indexed
         stop = self._raw.size if following is None else following
-        rest = "what stands behind it is lost" if following is None else f"{stop - at} bytes are lost"
-        self._block = _BEHIND
+        rest = "everything after it is lost" if following is None else f"{stop - at} bytes are lost"
+        self._block = _AFTER_DAMAGE
         self._damage.add_gap(at, stop, f"{reason}; {rest}")
         return following

@@ -1,9 +1,9 @@
-"""Where the fields of a CDR message stand, derived from its definition and one message's bytes.
+"""The layout of the fields in a message, derived from the definition and the bytes of one message.
 
-CDR aligns each primitive to its size, counted from behind the four bytes of encapsulation; a string is its length with
-the closing NUL (uint32), then its bytes; a sequence is its count (uint32), then its items. ROS 1 has no encapsulation,
-aligns nothing and closes no string. Two messages of one type have the same layout if they agree in every such length:
-those are the layout's `checks`.
+CDR aligns each primitive to its size, counted from the end of the four bytes of encapsulation. A string is its length
+with the closing NUL (uint32), then its bytes; a sequence is its count (uint32), then its items. ROS 1 has no
+encapsulation, no alignment and no closing NUL. Two messages of one type have the same layout if they agree in all these
+lengths, which are the `checks` of the layout.
 
 Source: OMG CORBA 3.0, chapter 15.3 (CDR transfer syntax); DDSI-RTPS 2.2, chapter 10 (encapsulation); https://wiki.ros.org/msg
 (ROS 1).
@@ -22,70 +22,69 @@ from rosbags.interfaces.typing import FieldDesc
 
 from navirl_cli.logs.messages.schema import PRIMITIVES, TIMES, Schema
 
-#: Bytes of encapsulation before a CDR message, and the first two of them, as uint16, by their byte order.
+#: Bytes of encapsulation before a CDR message; and by its first two bytes: the byte order, and the two as uint16.
 ENCAPSULATION_SIZE: Final = 4
 _ENCAPSULATIONS: Final = {b"\0\1": ("<", 0x0100), b"\0\0": (">", 0x0000)}
 #: Some writers pad a payload to a multiple of four bytes.
 _MAX_PADDING: Final = 3
-#: Messages of more fields, those in sequences counted, are decoded one by one.
+#: Messages with more fields, including those in sequences, are decoded one by one.
 _MAX_FIELDS: Final = 20_000
 
-#: numpy's type of a field; as text, "(3,)f8", numpy would parse it with `ast`, which threads must not share.
+#: numpy's type of a field; not as text, "(3,)f8", which numpy parses with `ast`: that is not safe in threads.
 Format = str | tuple[str, tuple[int]]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The layout that messages of one size and the same lengths share."""
+    """The layout of messages that have the same size and the same lengths inside."""
 
-    #: Structured type over the whole payload: a field for each wanted path ("path/sec" and "path/nanosec" of a time),
-    #: for each entry of a path in a sequence ("path#0", "path#1", ...), "#0", "#1", ... for the checks, and "~0", "~1",
-    #: ... for `texts`.
+    #: Structured type of the payload. Its fields are the wanted paths ("path/sec" and "path/nanosec" of a time), each
+    #: entry of a path in a sequence ("path#0", "path#1", ...), the checks ("#0", "#1", ...) and `texts` ("~0", ...).
     dtype: np.dtype[np.void]
-    #: The value each check must have, by its name in `dtype`.
+    #: The value that each check must have, by its name in `dtype`.
     checks: dict[str, int]
-    #: Number of entries of the sequences that wanted paths are in, by "path[]".
+    #: Number of entries of the sequences that hold wanted paths, by "path[]".
     counts: dict[str, int]
-    #: Texts that are not wanted, and must be texts all the same.
+    #: Texts that are not wanted, but must be valid.
     texts: tuple[str, ...]
 
     @cached_property
     def head(self) -> np.dtype[np.void]:
-        """The same fields over as many bytes as they need, which are quicker to gather."""
+        """The same fields over no more bytes than they need, which are gathered faster."""
         names = self.dtype.names or ()
         places = [self.dtype.fields[name][:2] for name in names] if self.dtype.fields else []
         return np.dtype(
             {
                 "names": list(names),
-                "formats": [kind for kind, _ in places],
+                "formats": [dtype for dtype, _ in places],
                 "offsets": [at for _, at in places],
-                "itemsize": max((at + kind.itemsize for kind, at in places), default=0),
+                "itemsize": max((at + dtype.itemsize for dtype, at in places), default=0),
             }
         )
 
 
 class _UnfitError(Exception):
-    """The bytes are not what the definition says, or of a kind that is not walked."""
+    """The bytes do not fit the definition, or hold a type that has no layout."""
 
 
 @dataclass
 class _Walker:
-    """Walks over one payload along the definition and notes where things are."""
+    """Walks over one payload along the definition and collects the places of fields, checks and texts."""
 
     schema: Schema
     payload: bytes
     wanted: frozenset[str]
-    #: Sequences that wanted fields are in.
+    #: Sequences that hold wanted fields.
     sequences: frozenset[str]
     order: str
-    #: First byte of the message, from which alignment counts.
+    #: First byte of the message, from which alignment is counted.
     base: int
     at: int
     fields: dict[str, tuple[int, Format]] = field(default_factory=dict)
     checks: list[tuple[int, str, int]] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     texts: list[tuple[int, Format]] = field(default_factory=list)
-    #: Entries met so far of each wanted field in a sequence.
+    #: Number of entries so far of each wanted field in a sequence.
     entries: Counter[str] = field(default_factory=Counter)
     steps: int = 0
 
@@ -158,7 +157,7 @@ class _Walker:
             self.one(desc, f"{path}[]")
 
     def entry(self, path: str) -> str:
-        """The name of a field: that of an entry of a sequence has its number."""
+        """The name of a field in the layout; an entry of a sequence has its number in its name."""
         if "[]" not in path:
             return path
         self.entries[path] += 1
@@ -167,7 +166,7 @@ class _Walker:
     def length(self, minimum: int) -> int:
         self.align(4)
         if self.at + 4 > len(self.payload):
-            raise _UnfitError("a length behind the end")
+            raise _UnfitError("a length after the end")
         (value,) = struct.unpack_from(self.order + "I", self.payload, self.at)
         if value < minimum:
             raise _UnfitError("a string without its closing NUL")
@@ -182,7 +181,7 @@ class _Walker:
     def skip(self, size: int) -> None:
         self.at += size
         if self.at > len(self.payload):
-            raise _UnfitError("a field behind the end")
+            raise _UnfitError("a field after the end")
 
 
 def derive(schema: Schema, payload: bytes, wanted: Iterable[str]) -> Layout | None:
@@ -190,12 +189,12 @@ def derive(schema: Schema, payload: bytes, wanted: Iterable[str]) -> Layout | No
 
     Args:
         schema: The message's type.
-        payload: The message, with its encapsulation where it has one.
+        payload: The message, with its encapsulation if it has one.
         wanted: Dotted fields that `Schema.leaf` knows.
 
     Returns:
-        The layout, or None where the message is none of this type, or holds a type that only rosbags decodes: such
-        messages are to be decoded one by one.
+        The layout; None if the bytes are not a message of this type, or if it holds a type that only rosbags decodes.
+        Such messages are decoded one by one.
     """
     order, base = "<", 0
     checks: list[tuple[int, str, int]] = []
@@ -214,14 +213,14 @@ def derive(schema: Schema, payload: bytes, wanted: Iterable[str]) -> Layout | No
         return None
     if not walker.at <= len(payload) <= walker.at + (_MAX_PADDING if schema.encoding == "cdr" else 0):
         return None
-    # a terminator must be zero, a length must be the sample's
-    checked = {f"#{number}": (at, kind) for number, (at, kind, _) in enumerate(walker.checks)}
+    # a terminator must be zero, and a length that of this message
+    checked = {f"#{number}": (at, form) for number, (at, form, _) in enumerate(walker.checks)}
     texts = {f"~{number}": place for number, place in enumerate(walker.texts)}
     places: dict[str, tuple[int, Format]] = {**walker.fields, **checked, **texts}
     dtype = np.dtype(
         {
             "names": list(places),
-            "formats": [kind for _, kind in places.values()],
+            "formats": [form for _, form in places.values()],
             "offsets": [at for at, _ in places.values()],
             "itemsize": len(payload),
         }

@@ -1,4 +1,4 @@
-"""Reading logs: what is in a file, and its messages as columns."""
+"""Reading logs: the contents of a file, and its messages as columns."""
 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -10,18 +10,18 @@ from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.messages.decode import Part
-from navirl_cli.logs.messages.series import Collector, Series
+from navirl_cli.logs.messages.decode import DecodedBatch
+from navirl_cli.logs.messages.series import Series, SeriesBuilder
 
 #: Called with the bytes done and the bytes of all files.
 Progress = Callable[[int, int], None]
-#: A file by its name, or one that is open already, since it had to be decompressed as a whole.
+#: The name of a file, or a file that is open already, for instance because it had to be decompressed.
 Log = Path | str | RawFile
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What is in one file."""
+    """The contents of one file."""
 
     path: Path
     profile: str
@@ -43,23 +43,23 @@ class Contents:
 
 @dataclass(frozen=True, eq=False)
 class ReadResult:
-    """Series by topic (only topics that some file has and that decode), and what could not be read."""
+    """A series for each topic that a file has and that decodes, and what could not be read."""
 
     series: dict[str, Series]
     damage: tuple[Damage, ...]
 
 
 def scan(path: Log) -> Contents:
-    """Say what is in a file, from its summary section where that is sound and complete, else from its messages.
+    """List the contents of a file: from its summary section if that is intact and complete, or else from its messages.
 
     Args:
         path: An MCAP file.
 
     Returns:
-        Its contents. Damage inside of chunks shows only where there is no summary, or in `read`.
+        Its contents. Damage inside chunks is found only if the file has no summary, or by `read`.
 
     Raises:
-        LogError: It is no MCAP file.
+        LogError: It is not an MCAP file.
     """
     with LogFile(path) as log:
         statistics = log.summary.statistics if log.summary else None
@@ -80,7 +80,7 @@ def scan(path: Log) -> Contents:
 def message_times(path: Log) -> tuple[Contents, dict[int, IntArray]]:
     """Contents of a file, and the times of receipt of all its messages.
 
-    Payloads are read only where message indexes are missing.
+    Chunks are opened only where message indexes are missing.
 
     Args:
         path: An MCAP file.
@@ -89,7 +89,7 @@ def message_times(path: Log) -> tuple[Contents, dict[int, IntArray]]:
         Its contents, and times in ns, ascending, by channel id.
 
     Raises:
-        LogError: It is no MCAP file.
+        LogError: It is not an MCAP file.
     """
     with LogFile(path) as log:
         times = log.times()
@@ -106,41 +106,41 @@ def read(
     """Read topics from one or several files.
 
     Args:
-        paths: MCAP files, in the order that equal times shall have.
+        paths: MCAP files; messages of equal times are returned in this order.
         wants: By topic: dotted fields such as "header.stamp", "wrench.force.x" or "poses[].position.x", which become
             columns.
         progress: Called with the bytes done and the bytes of all files.
-        threads: How many decompress and decode; by default as many as there are cores, up to four.
-        latest: Topics of which only the message received last is wanted, such as maps that are sent again and again.
+        threads: Number of threads that decompress and decode; by default one for each core, four at most.
+        latest: Topics of which only the message received last is wanted, such as maps that are sent repeatedly.
 
     Returns:
-        A series for each wanted topic that some file has, and the damage met on the way. A channel whose encoding,
-        definition or payloads are not what they should be, or that lacks a wanted field, is damage like any other.
+        A series for each wanted topic that a file has, and the damage. Damage includes channels whose encoding,
+        definition or payloads are invalid, and channels that lack a wanted field.
 
     Raises:
-        LogError: A file is no MCAP file.
+        LogError: A file is not an MCAP file.
     """
     files = [paths] if isinstance(paths, Path | str | RawFile) else list(paths)
     sizes = [_size(path) for path in files]
-    collectors = {topic: Collector(topic, topic in latest) for topic in wants}
+    builders = {topic: SeriesBuilder(topic, topic in latest) for topic in wants}
     damage: list[Damage] = []
     for number, path in enumerate(files):
 
-        def tell(share: float, done: int = sum(sizes[:number]), size: int = sizes[number]) -> None:
+        def report(share: float, done: int = sum(sizes[:number]), size: int = sizes[number]) -> None:
             if progress is not None:
                 progress(done + round(share * size), sum(sizes))
 
-        parts, notes = _read_file(path, wants, collectors, tell, threads or threads_here())
-        for topic, found in parts.items():
-            collectors[topic].add(found)
-        damage += notes
-        tell(1.0)
-    series = {topic: collector.series() for topic, collector in collectors.items() if collector.decoders}
+        batches, found = _read_file(path, wants, builders, report, threads or threads_here())
+        for topic, some in batches.items():
+            builders[topic].add(some)
+        damage += found
+        report(1.0)
+    series = {topic: builder.series() for topic, builder in builders.items() if builder.decoders}
     return ReadResult(series, tuple(damage))
 
 
 def _size(path: Log) -> int:
-    """Bytes of a file, as far as a progress bar is concerned."""
+    """Bytes of a file, for the progress; 0 if it is missing."""
     if isinstance(path, RawFile):
         return path.size
     return Path(path).stat().st_size if Path(path).is_file() else 0
@@ -149,22 +149,22 @@ def _size(path: Log) -> int:
 def _read_file(
     path: Log,
     wants: Mapping[str, Sequence[str]],
-    collectors: Mapping[str, Collector],
+    builders: Mapping[str, SeriesBuilder],
     progress: Callable[[float], None],
     threads: int,
-) -> tuple[dict[str, list[Part]], list[Damage]]:
-    """The parts of one file by topic, and its damage; a file whose indexes lack messages is walked over."""
+) -> tuple[dict[str, list[DecodedBatch]], list[Damage]]:
+    """The batches of one file by topic, and its damage; without message indexes if those lack messages."""
     for trust_indexes in (True, False):
         with LogFile(path, trust_indexes=trust_indexes) as log:
-            walk = _Walk(wants, collectors, {topic: [] for topic in wants})
+            walk = _Walk(wants, builders, {topic: [] for topic in wants})
             walk.over(log, progress, threads)
             missing = walk.missing(log)
-            texts = [*walk.spoilt(log), *missing]
-            texts += [text for topic, parts in walk.parts.items() for text in _undecoded(topic, parts)]
+            texts = [*walk.undecodable(log), *missing]
+            texts += [text for topic, batches in walk.batches.items() for text in _undecoded(topic, batches)]
             damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in texts)]
         if not missing:
             break
-    return walk.parts, damage
+    return walk.batches, damage
 
 
 @dataclass(eq=False)
@@ -172,23 +172,23 @@ class _Walk:
     """One walk over a file's wanted messages."""
 
     wants: Mapping[str, Sequence[str]]
-    collectors: Mapping[str, Collector]
+    builders: Mapping[str, SeriesBuilder]
     #: By topic.
-    parts: dict[str, list[Part]]
-    #: Messages met by channel.
+    batches: dict[str, list[DecodedBatch]]
+    #: Number of messages found, by channel.
     seen: Counter[int] = field(default_factory=Counter)
-    #: By channel that cannot be decoded: why.
+    #: The reasons why channels cannot be decoded, by channel.
     unusable: dict[int, str] = field(default_factory=dict)
 
     def over(self, log: LogFile, progress: Callable[[float], None], threads: int) -> None:
-        """Walk."""
-        for part, count in log.results(self.wanted, self.decoded, threads):
-            self.seen[part.channel.id] += count
-            parts = self.parts[part.channel.topic]
-            parts.append(part)
-            if self.collectors[part.channel.topic].latest:
-                decoded = [one for one in parts if len(one.order)]
-                parts[:] = sorted(decoded, key=lambda one: int(one.log_time_ns.max()))[-1:] or parts
+        """Walk over a file."""
+        for decoded, count in log.results(self.wanted, self.decoded, threads):
+            self.seen[decoded.channel.id] += count
+            batches = self.batches[decoded.channel.topic]
+            batches.append(decoded)
+            if self.builders[decoded.channel.topic].latest:
+                filled = [one for one in batches if len(one.order)]
+                batches[:] = sorted(filled, key=lambda one: int(one.log_time_ns.max()))[-1:] or batches
             progress(log.position / log.size)
         for channel in log.channels:
             self.wanted(channel)
@@ -197,55 +197,55 @@ class _Walk:
         """Whether a channel's messages are wanted and can be decoded."""
         if channel.topic not in self.wants:
             return False
-        trouble = self.collectors[channel.topic].takes(channel, tuple(self.wants[channel.topic]))
-        if trouble:
-            self.unusable[channel.id] = f"topic {channel.topic}: {trouble}"
-        return not trouble
+        error = self.builders[channel.topic].add_channel(channel, tuple(self.wants[channel.topic]))
+        if error:
+            self.unusable[channel.id] = f"topic {channel.topic}: {error}"
+        return not error
 
-    def decoded(self, batch: Batch) -> tuple[Part, int]:
-        """A batch's columns, and how many messages it has; in any thread."""
-        collector = self.collectors[batch.channel.topic]
-        decoder = collector.decoders[batch.channel]
-        newest = decoder.decode(batch.newest()) if collector.latest else None
-        part = newest if newest is not None and len(newest.order) else decoder.decode(batch)
-        return part, len(batch.starts)
+    def decoded(self, batch: Batch) -> tuple[DecodedBatch, int]:
+        """A batch's columns, and its number of messages; in any thread."""
+        builder = self.builders[batch.channel.topic]
+        decoder = builder.decoders[batch.channel]
+        newest = decoder.decode(batch.newest()) if builder.latest else None
+        decoded = newest if newest is not None and len(newest.order) else decoder.decode(batch)
+        return decoded, len(batch.starts)
 
-    def spoilt(self, log: LogFile) -> list[str]:
-        """What is lost by channels that cannot be decoded; those without messages are no loss."""
-        promised = _promised(log)
-        return [text for number, text in self.unusable.items() if promised is None or promised.get(number)]
+    def undecodable(self, log: LogFile) -> list[str]:
+        """The reasons why channels cannot be decoded, without those that have no messages."""
+        counted = _counted(log)
+        return [text for number, text in self.unusable.items() if counted is None or counted.get(number)]
 
     def missing(self, log: LogFile) -> list[str]:
-        """What the statistics promise beside what is there and what is known to be lost."""
-        promised = _promised(log) or {}
+        """The channels of which the statistics count more messages than were found and than are known to be lost."""
+        counted = _counted(log) or {}
         return [
-            f"{count} messages of {channel.topic} promised by the statistics, {self.seen[channel.id]} are there"
+            f"the statistics count {count} messages of {channel.topic}, {self.seen[channel.id]} were found"
             for channel in log.channels
             if channel.topic in self.wants
             and channel.id not in self.unusable
-            and (count := promised.get(channel.id, 0)) > self.seen[channel.id] + log.lost.get(channel.id, 0)
+            and (count := counted.get(channel.id, 0)) > self.seen[channel.id] + log.lost.get(channel.id, 0)
         ]
 
 
-def _promised(log: LogFile) -> Mapping[int, int] | None:
-    """Number of messages by channel as the statistics have it, None without statistics."""
+def _counted(log: LogFile) -> Mapping[int, int] | None:
+    """Number of messages by channel, by the file's statistics; None without statistics."""
     return log.summary.statistics.by_channel if log.summary and log.summary.statistics else None
 
 
-def _undecoded(topic: str, parts: Sequence[Part]) -> list[str]:
-    """What is lost by payloads that do not decode."""
-    seen = sum(part.count for part in parts)
-    bad = seen - sum(len(part.order) for part in parts)
+def _undecoded(topic: str, batches: Sequence[DecodedBatch]) -> list[str]:
+    """The damage of payloads that do not decode."""
+    seen = sum(decoded.count for decoded in batches)
+    bad = seen - sum(len(decoded.order) for decoded in batches)
     if not bad:
         return []
-    trouble = next(part.trouble for part in parts if part.trouble)
-    name = parts[0].channel.schema_name
+    error = next(decoded.error for decoded in batches if decoded.error)
+    name = batches[0].channel.schema_name
     many = f"all {seen}" if bad == seen else f"{bad} of {seen}"
-    return [f"{many} messages of {topic} do not decode as {name} and are lost ({trouble})"]
+    return [f"{many} messages of {topic} do not decode as {name} and are lost ({error})"]
 
 
 def _contents(log: LogFile, times: Mapping[int, IntArray]) -> Contents:
-    """Contents from the messages themselves."""
+    """The contents of a file, counted by the times of its messages."""
     counts = {channel.id: len(times.get(channel.id, ())) for channel in log.channels}
     start = min((int(one[0]) for one in times.values()), default=None)
     end = max((int(one[-1]) for one in times.values()), default=None)

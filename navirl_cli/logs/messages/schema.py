@@ -1,4 +1,4 @@
-"""Message definitions as they are embedded in a log, parsed by rosbags' type system."""
+"""Message definitions that are embedded in a log, parsed by rosbags' type system."""
 
 import json
 import re
@@ -34,23 +34,23 @@ PRIMITIVES: Final = {
 }
 
 _SEPARATOR: Final = "=" * 80 + "\n"
-#: What rosbags' parsers and its code generator raise on text that defines no message.
+#: What rosbags' parsers and code generator raise on an invalid definition.
 _PARSER_ERRORS: Final = (TypesysError, SyntaxError, LookupError, ValueError, TypeError, AttributeError, AssertionError)
-#: Entries of a fixed array of texts or messages (rosbags writes code for each), and of numbers.
+#: Most entries of a fixed array of texts or messages, for each of which rosbags generates code; and of numbers.
 _MAX_WRITTEN_OUT, _MAX_ARRAY = 1000, 1 << 28
-#: What rosbags puts into a message without fields, which has this byte in CDR, and in ROS 1 none.
+#: The field that rosbags gives to a message without fields: a byte in CDR, nothing in ROS 1.
 _FILLER: Final = "structure_needs_at_least_one_member"
 
-#: Schema encodings that go with each message encoding; JSON messages tell their own fields.
+#: Schema encodings by message encoding; JSON messages need no schema.
 ENCODINGS: Final = {"cdr": ("ros2msg", "ros2idl"), "ros1": ("ros1msg",), "json": None}
 
 
 class SchemaError(Exception):
-    """A definition does not parse, or a field is not in it; the message says why."""
+    """A definition does not parse or lacks a field; the message gives the reason."""
 
 
 class DecodeError(Exception):
-    """A payload is no message of its type; the message says why."""
+    """A payload is not a message of its type; the message gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +58,23 @@ class Leaf:
     """A field that becomes a column."""
 
     #: "time" (becomes int64 ns), "string" (becomes an object array) or "number".
-    kind: str
+    value_type: str
     #: numpy's type of one entry of the column.
     dtype: str
-    #: Number of entries a message of a fixed array; None for a single value.
+    #: Number of entries of a fixed array; None for a single value.
     count: int | None = None
-    #: The sequence that the field is in, "transforms[]", whose entries of all messages stand one after the other.
+    #: The sequence that holds the field, "transforms[]"; its column has the entries of all messages in order.
     sequence: str | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of one message's value."""
+        """Shape of the value of one message."""
         return () if self.count is None else (self.count,)
 
 
 @dataclass(frozen=True, eq=False)
 class Schema:
-    """A message type with every type it contains, apart from all other channels' types."""
+    """A message type with every type that it contains, in a store of its own."""
 
     #: Full name, "geometry_msgs/msg/WrenchStamped".
     name: str
@@ -83,41 +83,41 @@ class Schema:
     encoding: str = "cdr"
 
     def fields(self, typename: str) -> list[tuple[str, FieldDesc]]:
-        """Names and types of a contained type's fields, in the order of the bytes."""
+        """Names and types of the fields of a contained type, in the order of the bytes."""
         fields = self.store.fielddefs[typename][1]
         return fields if self.encoding == "cdr" else [one for one in fields if one[0] != _FILLER]
 
     def leaf(self, path: str) -> Leaf:
-        """The kind of a dotted field; "poses[].position.x" is a field of every entry of a sequence.
+        """The leaf of a dotted field; "poses[].position.x" is a field of every entry of a sequence.
 
         Raises:
-            SchemaError: There is no such field, or it does not become a column.
+            SchemaError: The type has no such field, or the field cannot become a column.
         """
         desc: FieldDesc = (Nodetype.NAME, self.name)
         sequence = None
-        for number, part in enumerate(parts := path.split(".")):
+        for number, step in enumerate(steps := path.split(".")):
             if desc[0] != Nodetype.NAME:
-                raise SchemaError(f"{part!r} in {path!r} lies below a field that is no single message")
-            name = part.removesuffix("[]")
+                raise SchemaError(f"{step!r} in {path!r} is below a field that is not a single message")
+            name = step.removesuffix("[]")
             fields = dict(self.fields(desc[1]))
             if name not in fields:
                 known = ", ".join(fields).replace(_FILLER, "none")
                 raise SchemaError(f"{desc[1]} has no field {name!r} of {path!r}; its fields are {known}")
             desc = fields[name]
-            if name != part:
+            if name != step:
                 if desc[0] not in {Nodetype.ARRAY, Nodetype.SEQUENCE} or sequence is not None:
-                    raise SchemaError(f"{part!r} in {path!r} is no sequence, or lies in another one")
-                desc, sequence = desc[1][0], ".".join(parts[: number + 1])
+                    raise SchemaError(f"{step!r} in {path!r} is not a sequence, or is inside another one")
+                desc, sequence = desc[1][0], ".".join(steps[: number + 1])
         leaf = _leaf(path, desc)
         if sequence is not None and leaf.count is not None:
             raise SchemaError(f"{path!r} is an array in a sequence")
-        return Leaf(leaf.kind, leaf.dtype, leaf.count, sequence)
+        return Leaf(leaf.value_type, leaf.dtype, leaf.count, sequence)
 
     def deserialize(self, payload: bytes) -> Any:
         """The message object of a payload.
 
         Raises:
-            DecodeError: It is no such message.
+            DecodeError: It is not a message of this type.
         """
         decode = self.store.deserialize_ros1 if self.encoding == "ros1" else self.store.deserialize_cdr
         try:
@@ -128,18 +128,18 @@ class Schema:
 
 @dataclass
 class JsonSchema:
-    """JSON objects of one channel, which need no definition: a field is what it is in the first message that tells."""
+    """JSON objects of one channel, without a definition: the first message that has a field gives its type."""
 
     name: str
     _leaves: dict[str, Leaf] = field(default_factory=dict)
 
     def leaf(self, path: str) -> Leaf:
-        """The kind of a field; a number where no message has told yet."""
+        """The leaf of a field; a number until a message has the field."""
         sequence = path.rpartition("[]")[0]
         return self._leaves.get(path, Leaf("number", "<f8", None, f"{sequence}[]" if sequence else None))
 
     def learn(self, payload: bytes, paths: Iterable[str]) -> bool:
-        """Take the kinds of fields that are not known yet from a message; say whether all are known now."""
+        """Learn the types of fields from a message; return whether all are known now."""
         unknown = [path for path in paths if path not in self._leaves]
         if unknown:
             try:
@@ -156,12 +156,12 @@ class JsonSchema:
         """The object.
 
         Raises:
-            DecodeError: The payload is no JSON object.
+            DecodeError: The payload is not a JSON object.
         """
         try:
             message = json.loads(payload)
         except (ValueError, RecursionError) as error:
-            raise DecodeError(f"no JSON: {error}") from error
+            raise DecodeError(f"not JSON: {error}") from error
         if not isinstance(message, dict):
             raise DecodeError(f"expected a JSON object, found {type(message).__name__}")
         return message
@@ -171,10 +171,10 @@ AnySchema = Schema | JsonSchema
 
 
 def value_at(message: Any, path: str) -> Any:
-    """The value of a dotted field of a message object or JSON object; a list for a field in a sequence.
+    """The value of a dotted field of a message object or JSON object; a list if the field is in a sequence.
 
     Raises:
-        DecodeError: A JSON object has no such field.
+        DecodeError: The object has no such field.
     """
     head, bracket, tail = path.partition("[]")
     value = message
@@ -189,12 +189,12 @@ def value_at(message: Any, path: str) -> Any:
     if not bracket:
         return value
     if isinstance(value, str | dict) or not hasattr(value, "__len__"):
-        raise DecodeError(f"{head!r} is no sequence")
+        raise DecodeError(f"{head!r} is not a sequence")
     return [value_at(one, tail[1:]) for one in value] if tail else list(value)
 
 
 def _json_leaf(message: Any, path: str, sequence: str | None) -> Leaf | None:
-    """What a field is by its value in a message; None where it is missing or has no entries."""
+    """The leaf of a field, by its value in a message; None if the field is missing or has no entries."""
     try:
         value = value_at(message, path)
     except DecodeError:
@@ -204,8 +204,8 @@ def _json_leaf(message: Any, path: str, sequence: str | None) -> Leaf | None:
     if isinstance(value, list) and sequence is None:
         return Leaf("number", "<f8", len(value))
     first = value if sequence is None else value[0]
-    kind, dtype = ("time", "<i8") if isinstance(first, dict) else ("number", "<f8")
-    return Leaf("string", "O", None, sequence) if isinstance(first, str) else Leaf(kind, dtype, None, sequence)
+    value_type, dtype = ("time", "<i8") if isinstance(first, dict) else ("number", "<f8")
+    return Leaf("string", "O", None, sequence) if isinstance(first, str) else Leaf(value_type, dtype, None, sequence)
 
 
 def parse_definition(name: str, encoding: str, text: str, message_encoding: str = "cdr") -> AnySchema:
@@ -213,15 +213,15 @@ def parse_definition(name: str, encoding: str, text: str, message_encoding: str 
 
     Args:
         name: Message type, "geometry_msgs/msg/WrenchStamped" or "geometry_msgs/WrenchStamped".
-        encoding: "ros2msg", "ros2idl" or "ros1msg"; any for JSON messages.
-        text: The definition followed by those of the contained types, as rosbag2 embeds them.
+        encoding: "ros2msg", "ros2idl" or "ros1msg"; ignored for JSON messages.
+        text: The definition, followed by those of the contained types, as rosbag2 embeds them.
         message_encoding: "cdr", "ros1" or "json".
 
     Returns:
-        The type in a store of its own: two channels may define one name differently. The same text is parsed once.
+        The type in a store of its own, because two channels may define one name differently. A text is parsed once.
 
     Raises:
-        SchemaError: The encodings are others, or the text does not define the type.
+        SchemaError: The encodings are not supported, or the text does not define the type.
     """
     full = full_name(name)
     fitting = ENCODINGS.get(message_encoding, ())
@@ -234,7 +234,7 @@ def parse_definition(name: str, encoding: str, text: str, message_encoding: str 
 
 @lru_cache(maxsize=256)
 def _parsed(full: str, encoding: str, text: str, message_encoding: str) -> Schema:
-    # such a store has nothing but times, which are primitives in ROS 1
+    # a store with times only, which are primitives in ROS 1
     store = get_typestore(Stores.EMPTY)
     schema = Schema(full, store, message_encoding)
     try:
@@ -248,23 +248,23 @@ def _parsed(full: str, encoding: str, text: str, message_encoding: str) -> Schem
 
 
 def full_name(name: str) -> str:
-    """A type's name as ROS 2 writes it: ROS 1 leaves "/msg" out."""
+    """A type's name as ROS 2 writes it; ROS 1 omits "/msg"."""
     return name if name.count("/") != 1 else name.replace("/", "/msg/")
 
 
 def _types_from_idl(text: str) -> Typesdict:
-    """Types of one IDL text, or of several with rosbag2's separators; what they include stands behind them."""
+    """Types of one IDL text, or of several with rosbag2's separators, where included types follow."""
     text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
     if not text.startswith(_SEPARATOR):
         return get_types_from_idl(text)
     types: Typesdict = {}
-    for part in text.split(_SEPARATOR)[1:]:
-        types.update(get_types_from_idl(part.partition("\n")[2]))
+    for definition in text.split(_SEPARATOR)[1:]:
+        types.update(get_types_from_idl(definition.partition("\n")[2]))
     return types
 
 
 def _check(schema: Schema) -> None:
-    """Every type that is used must be defined, and nothing may keep rosbags busy for ever."""
+    """Check that every type is defined, and that nothing keeps rosbags busy for ever."""
     known = schema.store.fielddefs
     fields = [(name, desc, _entry(desc)) for owner in known for name, desc in schema.fields(owner)]
     used = {entry[1] for _, _, entry in fields if entry[0] == Nodetype.NAME} | {schema.name}
@@ -282,12 +282,12 @@ def _check(schema: Schema) -> None:
 
 
 def _entry(desc: FieldDesc) -> FieldDesc:
-    """The type of a field, or of an entry of an array or sequence."""
+    """The type of a field; of an array or sequence, that of an entry."""
     return desc[1][0] if desc[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else desc
 
 
 def _leaf(path: str, desc: FieldDesc) -> Leaf:
-    """The leaf of a field's type."""
+    """The leaf of a field of this type."""
     if desc[0] == Nodetype.NAME and desc[1] in TIMES:
         return Leaf("time", "<i8")
     inner, count = desc[1] if desc[0] == Nodetype.ARRAY else (desc, None)
@@ -296,4 +296,4 @@ def _leaf(path: str, desc: FieldDesc) -> Leaf:
             return Leaf("string", "O")
         if inner[1][0] in PRIMITIVES:
             return Leaf("number", PRIMITIVES[inner[1][0]], count)
-    raise SchemaError(f"{path!r} is no number, text, time or fixed array of numbers")
+    raise SchemaError(f"{path!r} is not a number, text, time or fixed array of numbers")

@@ -1,4 +1,4 @@
-"""The messages of a topic as columns, gathered from files and channels."""
+"""The messages of a topic as columns, joined from all files and channels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Channel
-from navirl_cli.logs.messages.decode import Columns, Decoder, Part, empty_column
+from navirl_cli.logs.messages.decode import Columns, DecodedBatch, Decoder, empty_column
 from navirl_cli.logs.messages.schema import Schema, SchemaError, parse_definition
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """The messages of a topic, sorted by time of receipt; equal times keep the order of files and in the file."""
+    """The messages of a topic, sorted by time of receipt; equal times keep the order of the files and in the file."""
 
     topic: str
     schema_name: str
@@ -33,26 +33,25 @@ class Series:
 
 
 @dataclass(eq=False)
-class Collector:
-    """Gathers the parts of one topic."""
+class SeriesBuilder:
+    """Joins the batches of one topic to a series."""
 
     topic: str
     #: Whether only the message received last is kept.
     latest: bool = False
     schema_name: str = ""
-    #: By channel; the same definition in several files is one channel.
+    #: By channel; channels of several files with the same definition are one.
     decoders: dict[Channel, Decoder] = field(default_factory=dict)
     #: By file.
-    files: list[list[Part]] = field(default_factory=list)
+    files: list[list[DecodedBatch]] = field(default_factory=list)
 
-    def takes(self, channel: Channel, paths: tuple[str, ...]) -> str:
-        """Make the channel's decoder; say why there is none, or nothing."""
+    def add_channel(self, channel: Channel, paths: tuple[str, ...]) -> str:
+        """Make the channel's decoder; return the reason why it cannot be decoded, or ""."""
         if channel in self.decoders:
             return ""
         if self.decoders and channel.schema_name != self.schema_name:
-            return (
-                f"expected {self.schema_name}, as in its other channels, found {channel.schema_name}, which is left out"
-            )
+            found = f"found {channel.schema_name}, which is ignored"
+            return f"expected {self.schema_name}, as in its other channels, {found}"
         try:
             schema = parse_definition(
                 channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding
@@ -65,34 +64,34 @@ class Collector:
                 "its messages are lost"
             )
         if isinstance(schema, Schema) and any(other.leaves != leaves for other in self.decoders.values()):
-            return f"{channel.schema_name} is defined otherwise than in its other channels; its messages are lost"
+            return f"{channel.schema_name} is defined differently in its other channels; its messages are lost"
         self.schema_name = channel.schema_name
         self.decoders[channel] = Decoder(schema, paths)
         return ""
 
-    def add(self, parts: list[Part]) -> None:
-        """Take up the parts of a file."""
-        self.files.append(parts)
+    def add(self, batches: list[DecodedBatch]) -> None:
+        """Add the batches of a file."""
+        self.files.append(batches)
         if self.latest:
-            whole = [part for file in self.files for part in file if len(part.order)]
-            self.files = [[max(whole, key=lambda part: int(part.log_time_ns.max()))] if whole else []]
+            filled = [batch for file in self.files for batch in file if len(batch.order)]
+            self.files = [[max(filled, key=lambda batch: int(batch.log_time_ns.max()))] if filled else []]
 
     def series(self) -> Series:
-        """The sorted whole; parts are given up on the way."""
-        # a part without messages may not know the kinds of its fields
-        numbered = [(number, part) for number, file in enumerate(self.files) for part in file if len(part.order)]
-        numbers, parts = [number for number, _ in numbered], [part for _, part in numbered]
-        times = _joined([part.log_time_ns for part in parts])
-        rows = self._rows(parts, numbers, times)
+        """The series; the batches are consumed."""
+        # a batch without messages may have other types of columns
+        numbered = [(number, batch) for number, file in enumerate(self.files) for batch in file if len(batch.order)]
+        numbers, batches = [number for number, _ in numbered], [batch for _, batch in numbered]
+        times = _joined([batch.log_time_ns for batch in batches])
+        rows = self._rows(batches, numbers, times)
         if self.latest and len(times):
             rows = np.arange(len(times))[-1:] if rows is None else rows[-1:]
         leaves = next(iter(self.decoders.values())).leaves
         counts = {}
         for sequence in {leaf.sequence for leaf in leaves.values() if leaf.sequence}:
-            counts[sequence] = _joined([part.counts[sequence] for part in parts])
+            counts[sequence] = _joined([batch.counts[sequence] for batch in batches])
         columns: Columns = {}
         for path, leaf in leaves.items():
-            column = np.concatenate([part.columns.pop(path) for part in parts] or [empty_column(leaf, 0)])
+            column = np.concatenate([batch.columns.pop(path) for batch in batches] or [empty_column(leaf, 0)])
             if rows is not None:
                 column = column[rows if leaf.sequence is None else _entries(counts[leaf.sequence], rows)]
             columns[path] = column
@@ -101,11 +100,11 @@ class Collector:
         self.files.clear()
         return Series(self.topic, self.schema_name, times, columns, counts)
 
-    def _rows(self, parts: list[Part], numbers: list[int], times: IntArray) -> IntArray | None:
-        """The order of time, then of files, then in the file; None where it is that already."""
+    def _rows(self, batches: list[DecodedBatch], numbers: list[int], times: IntArray) -> IntArray | None:
+        """The order by time, then by file, then in the file; None if the batches are already in this order."""
         if len(self.decoders) > 1:
-            files = _joined([np.full(len(part.order), k) for k, part in zip(numbers, parts, strict=True)])
-            orders = _joined([part.order for part in parts])
+            files = _joined([np.full(len(batch.order), k) for k, batch in zip(numbers, batches, strict=True)])
+            orders = _joined([batch.order for batch in batches])
             return np.lexsort((orders, files, times))
         return np.argsort(times, kind="stable") if (np.diff(times) < 0).any() else None
 
@@ -115,8 +114,8 @@ def _joined(arrays: Sequence[IntArray]) -> IntArray:
 
 
 def _entries(counts: IntArray, rows: IntArray) -> IntArray:
-    """Where the entries of the messages `rows` stand, in this order of messages."""
+    """The places of the entries of the messages `rows`, in this order of the messages."""
     first = np.cumsum(counts) - counts
     taken = counts[rows]
-    behind = np.cumsum(taken) - taken
-    return np.repeat(first[rows] - behind, taken) + np.arange(int(taken.sum()))
+    before = np.cumsum(taken) - taken
+    return np.repeat(first[rows] - before, taken) + np.arange(int(taken.sum()))

@@ -1,4 +1,4 @@
-"""Logs written the way rosbag2 writes them: MCAP, profile ros2, zstd chunks, CDR messages, embedded definitions."""
+"""Writing logs as rosbag2 does: MCAP with profile ros2, zstd chunks, CDR messages and embedded definitions."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -27,7 +27,7 @@ _NS_PER_S: Final = 1_000_000_000
 
 @cache
 def _builtin() -> Typestore:
-    """The standard message types; loading them takes a tenth of a second, hence once."""
+    """The standard message types, loaded once because that takes a tenth of a second."""
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
@@ -41,14 +41,14 @@ def message_type(name: str) -> Any:
         A dataclass whose fields are those of the message; numeric arrays must be numpy arrays of the exact type.
 
     Raises:
-        LogError: There is no such standard type.
+        LogError: It is not a standard type.
     """
     try:
         return _builtin().types[name]
     except KeyError:
         raise LogError(
             f"message type {name!r}: expected a standard ROS 2 type such as geometry_msgs/msg/WrenchStamped, found "
-            "none of that name; navirl writes standard types only"
+            "no type of this name; navirl writes standard types only"
         ) from None
 
 
@@ -79,9 +79,9 @@ class _Channel:
 class LogWriter:
     """Writes one MCAP file; a context manager.
 
-    Messages are held back and written in order of their log time, whatever the order of the calls, as a recorder
-    receives them. The file appears under its name when the block ends without an exception; else nothing is left. The
-    same calls write the same bytes.
+    Messages are kept in memory and written in the order of their log times, as a recorder receives them, for any order
+    of the calls. The file appears under its name when the block ends without an exception; otherwise nothing is left.
+    The same calls write the same bytes.
 
     Args:
         path: The file to write.
@@ -128,7 +128,7 @@ class LogWriter:
             self._writer.finish()  # type: ignore[no-untyped-call]
 
     def flush(self) -> None:
-        """Write what is held back, in order of log time; what comes later may not be earlier than it."""
+        """Write the messages so far in the order of log time; later messages must have later times."""
         self._held.sort(key=itemgetter(0))
         for log_time_ns, channel, payload, publish_time_ns in self._held:
             sequence = self._sequences.get(channel, 0)
@@ -153,11 +153,11 @@ class LogWriter:
         self._add(channel, bytes(payload), log_time_ns, log_time_ns if publish_time_ns is None else publish_time_ns)
 
     def columns(self, topic: str, template: Any, log_time_ns: ArrayLike, columns: Mapping[str, ArrayLike]) -> None:
-        """Write many messages that differ in numbers and times only, without making an object of each.
+        """Write many messages that differ only in numbers and times, without an object for each.
 
         Args:
             topic: "/wrench".
-            template: A message; what `columns` does not name is taken from it.
+            template: A message that gives the fields that `columns` does not name.
             log_time_ns: Shape (n,), ns; also the time of publishing.
             columns: Values by dotted field: shape (n,), or (n, k) for a fixed array of k numbers; times such as
                 "header.stamp" in ns. No texts.
@@ -175,14 +175,14 @@ class LogWriter:
             self._add(channel, data[number * size : (number + 1) * size], t_ns, t_ns)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record: a name and texts by key."""
+        """Write a metadata record with a name and texts by key."""
         self._writer.add_metadata(name, dict(values))
 
     def _add(self, channel: _Channel, payload: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         self._held.append((int(log_time_ns), channel.id, payload, int(publish_time_ns)))
 
     def _channel(self, topic: str, typename: str) -> _Channel:
-        """The topic's channel, registered with its definition at first use."""
+        """The topic's channel; its first use registers it with its definition."""
         channel = self._channels.get(topic)
         if channel is None:
             if typename not in self._schemas:
@@ -191,7 +191,10 @@ class LogWriter:
             channel = _Channel(self._writer.register_channel(topic, "cdr", self._schemas[typename]), typename)
             self._channels[topic] = channel
         if channel.typename != typename:
-            raise LogError(f"{self.path}: topic {topic} holds {channel.typename}, found a message of type {typename}")
+            raise LogError(
+                f"{self.path}: topic {topic}: expected messages of type {channel.typename}, found one of {typename}; "
+                "write it to another topic"
+            )
         return channel
 
 
@@ -205,15 +208,17 @@ def _fill(topic: str, template: Any, n: int, columns: Mapping[str, ArrayLike]) -
         raise LogError(f"topic {topic}: {error}") from error
     layout = derive(schema, payload, leaves)
     if layout is None:
-        raise LogError(f"topic {topic}: {schema.name} holds a type that navirl cannot fill by columns; write messages")
+        raise LogError(
+            f"topic {topic}: expected a type that can be filled by columns, found {schema.name}; write single messages"
+        )
     rows = np.frombuffer(bytearray(payload * n), dtype=layout.dtype)
     for path, leaf in leaves.items():
         values = np.asarray(columns[path])
-        if leaf.kind == "string":
-            raise LogError(f"topic {topic}: {path} is a text, which the template gives, expected numbers or times")
+        if leaf.value_type == "string":
+            raise LogError(f"topic {topic}: {path}: expected numbers or times, found a text; set it in the template")
         if values.shape != (n, *leaf.shape):
-            raise LogError(f"topic {topic}: {path} has shape {values.shape}, expected {(n, *leaf.shape)}")
-        if leaf.kind == "time":
+            raise LogError(f"topic {topic}: {path}: expected shape {(n, *leaf.shape)}, found {values.shape}")
+        if leaf.value_type == "time":
             rows[path + "/sec"], rows[path + "/nanosec"] = np.divmod(values.astype(np.int64), _NS_PER_S)
         else:
             rows[path] = values

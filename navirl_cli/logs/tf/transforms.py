@@ -1,4 +1,4 @@
-"""Transforms at given times, and the links between two frames that they are made of.
+"""Transforms between frames at given times, and the stamped links that they are computed from.
 
 Between two stamps the translation is interpolated linearly and the rotation by spherical linear interpolation
 (Shoemake 1985, Animating rotation with quaternion curves, SIGGRAPH), as tf2 does.
@@ -20,7 +20,7 @@ Span = tuple[int, int]
 
 #: Before and after all stamps, ns.
 ALWAYS: Final[Span] = (int(np.iinfo(np.int64).min), int(np.iinfo(np.int64).max))
-#: No frame's origin is further away, in m; a damaged number may be.
+#: The origin of a frame is nearer than this, m; a damaged number may not be.
 _FARTHEST_M: Final = 1e9
 
 _STAMP: Final = "transforms[].header.stamp"
@@ -37,7 +37,7 @@ class Link:
 
     parent: str
     child: str
-    #: Stamps in ns, shape (k,), any order; a fixed link needs one row, whose stamp does not matter.
+    #: Stamps in ns, shape (k,), in any order; a fixed link needs one row, whose stamp is ignored.
     t_ns: IntArray
     #: Origin of the child in the parent, m, shape (k, 3).
     translation_m: FloatArray
@@ -93,13 +93,13 @@ class Transforms:
         return Transforms(back, -rotate(back, self.translation_m))
 
     def after(self, first: "Transforms") -> "Transforms":
-        """The transforms that apply `first` and then these."""
+        """The transforms that apply `first` and then these ones."""
         return Transforms(product(self.quaternion, first.quaternion), self.apply(first.translation_m))
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The sound poses of a child frame in its parent, in order of time."""
+    """The valid poses of a child frame in its parent, in order of time."""
 
     parent: str
     child: str
@@ -113,17 +113,17 @@ class Curve:
 
     @classmethod
     def of(cls, links: Sequence[Link], parent: str, child: str, *, fixed: bool, zeros: bool) -> tuple[Self | None, int]:
-        """Join links into a curve; of equal stamps, and of fixed poses, the last counts.
+        """Join links into a curve; of equal stamps, and of fixed poses, the last is used.
 
         Args:
             links: At least one.
             parent: Name of the parent frame.
             child: Name of the child frame.
-            fixed: Whether stamps do not matter.
-            zeros: Whether a stamp of 0 is sound.
+            fixed: Whether the link is fixed and its stamps are ignored.
+            zeros: Whether a stamp of 0 is valid.
 
         Returns:
-            The curve, None if no pose is sound; and how many are not.
+            The curve, None if no pose is valid; and the number of invalid poses.
         """
         t_ns = np.concatenate([np.asarray(link.t_ns, dtype=np.int64) for link in links])
         translation = np.concatenate([np.asarray(link.translation_m, dtype=np.float64) for link in links])
@@ -144,15 +144,15 @@ class Curve:
         return ALWAYS if self.fixed else (int(self.t_ns[0]), int(self.t_ns[-1]))
 
     def at(self, times: IntArray, until: IntArray) -> Transforms:
-        """The child's poses in the parent, held beyond the stamps.
+        """The child's poses in the parent; before the first stamp and after the last one they are held.
 
         Args:
             times: Shape (n,), ns.
-            until: When another parent takes over, shape (n,), ns: a stamp beyond is not interpolated to.
+            until: When another parent takes over, shape (n,), ns. Stamps after that are not interpolated to.
         """
         rows = self._rows(times)
         after = np.minimum(rows + 1, len(self.t_ns) - 1)
-        # differences first: nanoseconds since 1970 do not fit into a float
+        # differences first: a float cannot resolve nanoseconds since 1970
         step = np.maximum(self.t_ns[after] - self.t_ns[rows], 1)
         share = np.where(self.t_ns[after] <= until, np.clip((times - self.t_ns[rows]) / step, 0.0, 1.0), 0.0)
         line = share[:, None]
@@ -160,7 +160,7 @@ class Curve:
         return Transforms(slerp(self.quaternion[rows], self.quaternion[after], share), translation)
 
     def gaps(self, times: IntArray, until: IntArray) -> IntArray:
-        """Distance in ns between the stamps around each time, or to the only one; 0 on a stamp; shape (n,)."""
+        """Distance in ns between the stamps around each time, or to the only one; 0 at a stamp; shape (n,)."""
         if self.fixed:
             return np.zeros(len(times), dtype=np.int64)
         rows = self._rows(times)
@@ -173,17 +173,17 @@ class Curve:
         return np.maximum(np.searchsorted(self.t_ns, times, side="right") - 1, 0)
 
 
-#: Curves from a frame up, each with when another parent takes over, shape (m,), ns.
+#: Curves from a frame up to an ancestor, each with the times at which another parent takes over, shape (m,), ns.
 Steps = list[tuple[Curve, IntArray]]
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """How two frames connect at some of the times of a lookup."""
+class Chain:
+    """The chain of transforms between two frames at some times of a lookup."""
 
-    #: Which times, shape (m,).
+    #: Rows of these times, shape (m,).
     rows: IntArray
-    #: From the source frame up to where the two meet.
+    #: From the source frame up to the frame in which the two meet.
     up: Steps
     #: The same from the target frame.
     down: Steps
@@ -200,8 +200,8 @@ class Way:
         return max(first for first, _ in spans), min(last for _, last in spans)
 
     def at(self, times: IntArray) -> Transforms:
-        """The transforms from source to target at the way's times, shape (m,)."""
-        into, back = (_chain(steps, times) for steps in (self.up, self.down))
+        """The transforms from source to target at the chain's times, shape (m,)."""
+        into, back = (_composed(steps, times) for steps in (self.up, self.down))
         return back.inverse().after(into) if self.down else into
 
     def gaps(self, times: IntArray) -> IntArray:
@@ -215,12 +215,13 @@ def in_force(curves: Sequence[Curve], covers: Mapping[str, Span], times: IntArra
     """Which of a child's curves is in force at each time, and when another one takes over.
 
     Args:
-        curves: To different parents, p of them.
-        covers: From when to when a parent's own transforms have stamps, ns: others do not count, if any do.
+        curves: Curves to p different parents.
+        covers: By parent, the span of its own transforms above it, ns. Stamps outside of it do not count, unless all
+            stamps are outside.
         times: Shape (n,), ns.
 
     Returns:
-        Numbers below p, shape (n,), and times in ns, shape (n,).
+        Index of the curve, shape (n,), and the time in ns at which another one takes over, shape (n,).
     """
     if len(curves) == 1:
         return np.zeros(len(times), dtype=np.int64), np.full(len(times), ALWAYS[1])
@@ -242,11 +243,11 @@ def links_of(columns: Mapping[str, NDArray[Any]], counts: IntArray, t_ns: IntArr
     Args:
         columns: By field, such as `transforms[].transform.rotation.w`: the entries of all messages in order, shape
             (total,); translations in m, stamps as int64 ns, names as str objects.
-        counts: How many entries each message has, shape (n,).
-        t_ns: Stamps in ns in place of the column's, shape (total,).
+        counts: Number of entries of each message, shape (n,).
+        t_ns: Stamps in ns that replace the column's, shape (total,).
 
     Returns:
-        Links in order of their last entries, so that of several fixed ones the last stays the last.
+        Links in the order of their last entries, so that the last of several fixed links stays the last.
 
     Raises:
         FrameError: A field is missing or has another number of entries than the messages.
@@ -257,7 +258,7 @@ def links_of(columns: Mapping[str, NDArray[Any]], counts: IntArray, t_ns: IntArr
         if name not in columns:
             raise FrameError(
                 f"transforms: expected the field {name}, found {', '.join(columns) or 'no fields'}; "
-                "record tf2_msgs/msg/TFMessage, or leave the topic out"
+                "record tf2_msgs/msg/TFMessage, or leave out the topic"
             )
         if (found := len(columns[name])) != total:
             raise FrameError(f"transforms: expected {total} entries in the field {name}, found {found}")
@@ -276,12 +277,12 @@ def links_of(columns: Mapping[str, NDArray[Any]], counts: IntArray, t_ns: IntArr
 
 
 def beyond(times: IntArray, span: Span, hold_ns: int = 0) -> BoolArray:
-    """Which times lie further outside of a span than `hold_ns`, shape (n,)."""
+    """Which times lie more than `hold_ns` outside of a span, shape (n,)."""
     return (times < span[0] - hold_ns) | (times > span[1] + hold_ns)
 
 
-def _chain(steps: Steps, times: IntArray) -> Transforms:
-    """The transforms up a chain of curves."""
+def _composed(steps: Steps, times: IntArray) -> Transforms:
+    """The transforms of several steps, one after the other."""
     poses = Transforms(np.tile(IDENTITY, (len(times), 1)), np.zeros((len(times), 3)))
     for curve, until in steps:
         poses = curve.at(times, until).after(poses)
