@@ -1,14 +1,18 @@
-"""Measure reading a long log against reading and decompressing alone, and against the readers that others use.
+"""Measure how long reading a long log takes, against reading and decompressing alone and against other readers.
 
-python benchmarks/read.py [--quick] [--json] [--folder FOLDER]. Each row ends with its bar; exit 0 only where every bar
-holds. The task: (t, fx, fy) of every wrench and (t, x, y, yaw) of every odometry as arrays, from a log of 20 minutes
-and 1 GB (read_log.py) in the page cache. Each run of a way is a fresh process, so that its peak memory is its own, the
-interpreter included. Ways take turns, slow ones once, fast ones three times; times are medians without imports (which
-have a column), ratios medians over the turns. Values are compared by digests of their bytes. The bound reads the chunks
-that hold the topics and decompresses them on one thread, knowing where they are and checking nothing: once plainly, as
-any Python program would, and once with the file read into one buffer. With glibc the former takes four times as long,
-because a megabyte freed goes back to the system and comes back page by page. --quick takes 2 minutes in place of 20, in
-which a first call's own costs show, so that its ratios have no bars. --folder keeps the logs, or uses those there.
+python benchmarks/read.py [--quick] [--json] [--folder FOLDER]. Each row ends with its bar; the exit code is 0 only
+where every bar holds. The task is to read (t, fx, fy) of all wrenches and (t, x, y, yaw) of all odometry as arrays,
+from a log of 20 minutes and 1 GB (read_log.py) in the page cache. Each run of a reader is a new process, so that its
+peak memory is its own, with that of the interpreter. The readers take turns: slow ones run once, fast ones three times.
+Times are medians without imports, which have a column of their own; ratios are medians over the turns. Values are
+compared by digests of their bytes.
+
+The bound reads the chunks that hold the topics and decompresses them in one thread; it knows their places and checks
+nothing. It is measured twice: as a plain Python program, and with the file read into one buffer. With glibc the former
+takes four times as long, because each freed megabyte is returned to the system and comes back page by page.
+
+--quick reads 2 minutes in place of 20; its ratios have no bars, because they include the cost of first calls. --folder
+keeps the logs, or uses those that are there.
 """
 
 import argparse
@@ -27,13 +31,13 @@ from typing import TYPE_CHECKING, Any
 
 from rows import Row, report
 
-# What is imported up here counts in every way's memory, and on Linux a process's peak starts from its parent's: numpy
-# and the readers are imported where they are used, and this process reads nothing.
+# Imports at the top count in the memory of every reader, and on Linux the peak of a process starts from its parent's.
+# Numpy and the readers are therefore imported where they are used, and this process reads nothing.
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Columns = dict[str, NDArray[Any]]
-    #: Does the task and returns its arrays by name, or does something else.
+    #: Does the task and returns its arrays by name; the bound returns None.
     Work = Callable[[], object]
 
 MINUTES, MINUTES_QUICK, TURNS = 20, 2, 3
@@ -48,9 +52,9 @@ WANTS = {
 class Log:
     """A log on the disk."""
 
-    kind: str
+    variant: str
     path: Path
-    #: The same without its last bytes, and hence without its summary.
+    #: The same log without its last bytes, so that the summary is lost.
     cut: Path
     size: int
     messages: int
@@ -59,11 +63,11 @@ class Log:
 
 @dataclass(frozen=True)
 class Measured:
-    """One run of one way."""
+    """One run of a reader."""
 
-    kind: str
-    way: str
-    #: Imports, and what else the way may know beforehand.
+    variant: str
+    reader: str
+    #: Time of imports and of what the reader may know beforehand.
     ready_s: float
     work_s: float
     peak_mb: float
@@ -79,13 +83,13 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="keep the logs here, or use those that are there")
     options = parser.parse_args()
     logs, runs, rows = [], [], []
-    for kind in KINDS:
+    for variant in VARIANTS:
         with tempfile.TemporaryDirectory() as scratch:
-            log = apart(prepared, options.folder or Path(scratch), MINUTES_QUICK if options.quick else MINUTES, kind)
+            log = apart(prepared, options.folder or Path(scratch), MINUTES_QUICK if options.quick else MINUTES, variant)
             found = measured_in_turns(log)
         logs.append(log)
         runs += found
-        rows += bars(kind, found, quick=options.quick)
+        rows += bars(variant, found, quick=options.quick)
     if options.json:
         tables = {"logs": logs, "runs": runs, "bars": rows}
         print(json.dumps({name: [asdict(one) for one in table] for name, table in tables.items()}, default=str))
@@ -100,35 +104,35 @@ def apart(function: Callable[..., Any], *arguments: object) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def prepared(folder: Path, minutes: int, kind: str) -> Log:
-    """A log of a kind in a folder, written unless it is there already."""
+def prepared(folder: Path, minutes: int, variant: str) -> Log:
+    """A log of a variant in a folder; it is written unless it is there already."""
     from read_log import prepare
 
-    compression, crc = KINDS[kind]
-    stem = f"{minutes}min-{kind.replace(' ', '-')}"
-    return Log(kind, *prepare(folder, stem, 60 * minutes, compression=compression, crc=crc))
+    compression, crc = VARIANTS[variant]
+    stem = f"{minutes}min-{variant.replace(' ', '-')}"
+    return Log(variant, *prepare(folder, stem, 60 * minutes, compression=compression, crc=crc))
 
 
 def measured_in_turns(log: Log) -> list[Measured]:
-    """Run the fast ways in turns, and one of the slow ones at the end of each of the first turns."""
-    slow = [] if log.kind == CHECKED else list(SLOW)
-    return [apart(measure, log, way) for turn in range(TURNS) for way in (*FAST, *slow[turn : turn + 1])]
+    """Run the fast readers in turns, and one of the slow ones at the end of each of the first turns."""
+    slow = [] if log.variant == CHECKED else list(SLOW)
+    return [apart(measure, log, reader) for turn in range(TURNS) for reader in (*FAST, *slow[turn : turn + 1])]
 
 
-def measure(log: Log, way: str) -> Measured:
+def measure(log: Log, reader: str) -> Measured:
     """Read a log, in this process."""
     import hashlib
     import resource
 
     begun = time.perf_counter()
-    work = {**FAST, **SLOW}[way](log.cut if way == WALK else log.path)
+    work = {**FAST, **SLOW}[reader](log.cut if reader == WALK else log.path)
     ready = time.perf_counter()
     found = work()
     done = time.perf_counter()
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
     columns = found if isinstance(found, dict) else {}
     digests = {name: hashlib.sha256(values.tobytes()).hexdigest() for name, values in columns.items()}
-    return Measured(log.kind, way, ready - begun, done - ready, peak_mb, digests)
+    return Measured(log.variant, reader, ready - begun, done - ready, peak_mb, digests)
 
 
 def bound(path: Path, *, kept: bool = False) -> "Work":
@@ -204,7 +208,7 @@ def rosbags(path: Path) -> "Work":
 
 
 def gathered(messages: Iterable[tuple[str, Any]]) -> "Columns":
-    """The task's columns from message objects, gathered in arrays of machine numbers, which is quick and small."""
+    """The task's columns from message objects, gathered in arrays of machine numbers, which are fast and small."""
     from array import array
 
     import numpy as np
@@ -240,57 +244,57 @@ FAST = {BOUND: bound, KEPT: partial(bound, kept=True), NAVIRL: navirl, WALK: nav
 SLOW = {MCAP: mcap_ros2, ROSBAGS: rosbags}
 ZSTD, PLAIN, CHECKED = "zstd", "uncompressed", "zstd and CRCs"
 #: Compression of the chunks, and whether they have CRCs.
-KINDS = {ZSTD: ("zstd", False), PLAIN: ("", False), CHECKED: ("zstd", True)}
+VARIANTS = {ZSTD: ("zstd", False), PLAIN: ("", False), CHECKED: ("zstd", True)}
 
 
-def bars(kind: str, found: Sequence[Measured], *, quick: bool) -> list[Row]:
+def bars(variant: str, found: Sequence[Measured], *, quick: bool) -> list[Row]:
     """Rows of one log."""
-    runs = {way: [one for one in found if one.way == way] for way in (*FAST, *SLOW)}
+    runs = {reader: [one for one in found if one.reader == reader] for reader in (*FAST, *SLOW)}
     ours_s = statistics.median(one.work_s for one in runs[NAVIRL])
     ratios = [
-        Row.at_most(f"{kind}: navirl over the bound", over(runs[NAVIRL], runs[BOUND]), "", 1.8),
-        Row(f"{kind}: navirl over the bound with one buffer", over(runs[NAVIRL], runs[KEPT]), ""),
-        Row(f"{kind}: navirl on the cut file over the bound", over(runs[WALK], runs[BOUND]), ""),
+        Row.at_most(f"{variant}: navirl over the bound", over(runs[NAVIRL], runs[BOUND]), "", 1.8),
+        Row(f"{variant}: navirl over the bound with one buffer", over(runs[NAVIRL], runs[KEPT]), ""),
+        Row(f"{variant}: navirl on the cut file over the bound", over(runs[WALK], runs[BOUND]), ""),
         *(
-            Row.at_least(f"{kind}: {way} over navirl", runs[way][0].work_s / ours_s, "", least)
-            for way, least in ((MCAP, 12), (ROSBAGS, 6))
-            if runs[way]
+            Row.at_least(f"{variant}: {reader} over navirl", runs[reader][0].work_s / ours_s, "", least)
+            for reader, least in ((MCAP, 12), (ROSBAGS, 6))
+            if runs[reader]
         ),
     ]
-    # Elsewhere the bound spares itself the checking of CRCs, or is a copy of bytes that a reader need not look at.
-    unbarred = len(ratios) if quick else 0 if kind == ZSTD else 1
+    # In the other logs the bound checks no CRCs, or copies bytes that a reader need not look at.
+    unbarred = len(ratios) if quick else 0 if variant == ZSTD else 1
     ratios[:unbarred] = [replace(row, bar="", holds=True) for row in ratios[:unbarred]]
-    peak_mb = max(one.peak_mb for way in (NAVIRL, WALK) for one in runs[way])
+    peak_mb = max(one.peak_mb for reader in (NAVIRL, WALK) for one in runs[reader])
     return [
         *ratios,
-        Row(f"{kind}: navirl's scan", 1e3 * statistics.median(one.work_s for one in runs[SCAN]), "ms"),
-        Row.at_most(f"{kind}: navirl's peak memory, cut file or not", peak_mb, "MB", 150),
-        *(same(kind, way, runs[way], runs[NAVIRL]) for way in (WALK, MCAP, ROSBAGS) if runs[way]),
+        Row(f"{variant}: navirl's scan", 1e3 * statistics.median(one.work_s for one in runs[SCAN]), "ms"),
+        Row.at_most(f"{variant}: navirl's peak memory, cut file or not", peak_mb, "MB", 150),
+        *(same(variant, reader, runs[reader], runs[NAVIRL]) for reader in (WALK, MCAP, ROSBAGS) if runs[reader]),
     ]
 
 
 def over(ours: Sequence[Measured], theirs: Sequence[Measured]) -> float:
-    """Median over the turns of the ratio of two ways' times."""
+    """Median over the turns of the ratio of two readers' times."""
     return statistics.median(one.work_s / other.work_s for one, other in zip(ours, theirs, strict=True))
 
 
-def same(kind: str, way: str, theirs: Sequence[Measured], ours: Sequence[Measured]) -> Row:
-    """Row that says which of a way's arrays differ from those of navirl, in any run."""
+def same(variant: str, reader: str, theirs: Sequence[Measured], ours: Sequence[Measured]) -> Row:
+    """A row with the arrays of a reader that differ from those of navirl in any run."""
     runs = [one.digests for one in (*theirs, *ours)]
     differing = [name for name in runs[0] if len({digests[name] for digests in runs}) > 1]
-    what = f"{kind}: arrays of {way} unlike navirl's" + "".join(f", {name}" for name in differing)
+    what = f"{variant}: arrays of {reader} unlike navirl's" + "".join(f", {name}" for name in differing)
     return Row.at_most(what, len(differing), "", 0)
 
 
 def print_tables(logs: Sequence[Log], runs: Sequence[Measured]) -> None:
-    """Print a line a log, then a line a log and way."""
+    """Print a line for each log, then a line for each log and reader."""
     for log in logs:
-        print(f"{log.kind + ':':<14} {log.size:>13,} bytes, {log.messages:,} messages, {log.chunks:,} chunks")
-    print(f"\n{'log':<14} {'way':<18} {'runs':>4} {'imports s':>10} {'work s':>8} {'peak MB':>8}")
-    for kind, way in dict.fromkeys((one.kind, one.way) for one in runs):
-        own = [one for one in runs if (one.kind, one.way) == (kind, way)]
+        print(f"{log.variant + ':':<14} {log.size:>13,} bytes, {log.messages:,} messages, {log.chunks:,} chunks")
+    print(f"\n{'log':<14} {'reader':<18} {'runs':>4} {'imports s':>10} {'work s':>8} {'peak MB':>8}")
+    for variant, reader in dict.fromkeys((one.variant, one.reader) for one in runs):
+        own = [one for one in runs if (one.variant, one.reader) == (variant, reader)]
         ready_s, work_s = (statistics.median(getattr(one, name) for one in own) for name in ("ready_s", "work_s"))
-        print(f"{kind:<14} {way:<18} {len(own):>4} {ready_s:>10.3f} {work_s:>8.3f}", end=" ")
+        print(f"{variant:<14} {reader:<18} {len(own):>4} {ready_s:>10.3f} {work_s:>8.3f}", end=" ")
         print(f"{max(one.peak_mb for one in own):>8.0f}")
     print()
 

@@ -1,10 +1,9 @@
-"""Write a log of a robot that is pushed around with its camera on, of any length, in rosbag2's way.
+"""Write a log of any length of a robot that is pushed around with its camera on, as rosbag2 does.
 
-Two wanted topics stand between much that nobody asked for: wrenches at 500 Hz, odometry and transforms at 50 Hz, and
-images of bytes that do not compress, 10 a second, which fill the file: 20 minutes make 1 GB. Chunks of 1 MiB, message
-indexes and summary are rosbag2's; whether chunks are compressed and have CRCs is a matter of its options: by default
-neither, and its presets with zstd leave the CRCs out as well, which other recorders write. The same length gives the
-same bytes.
+The two wanted topics are mixed with others: wrenches at 500 Hz, odometry and transforms at 50 Hz, and images of bytes
+that do not compress at 10 Hz, which fill most of the file: 20 minutes make 1 GB. Chunks of 1 MiB, message indexes and
+summary are those of rosbag2. Its options decide whether chunks are compressed and have CRCs: by default neither, and
+its presets with zstd have no CRCs, which other recorders write. The same length gives the same bytes.
 """
 
 import os
@@ -26,7 +25,7 @@ from log_factory import START_NS, build, cdr, definition, header, odometry, vect
 from navirl_cli.arrays import FloatArray
 
 SEED = 4
-#: Bytes lost from the end of the second log: with footer and magic the way to the summary is gone.
+#: Bytes lost from the end of the second log: without footer and magic the summary cannot be found.
 CUT_BYTES = 20
 WRENCH_HZ, ODOMETRY_HZ, IMAGE_HZ = 500, 50, 10
 IMAGE_BYTES = 78_500
@@ -44,11 +43,11 @@ Stream = Iterator[tuple[int, str, bytes]]
 
 
 def prepare(folder: Path, stem: str, seconds: int, *, compression: str, crc: bool) -> tuple[Path, Path, int, int, int]:
-    """Write a log, and a second one without its last bytes, unless they are there already.
+    """Write a log and a second one without its last bytes, unless they exist already.
 
     Returns:
-        Their paths, and the first one's bytes, messages and chunks. Both are in the page cache and on the disk, so that
-        nothing is read or written while times are taken.
+        Their paths, and bytes, messages and chunks of the first one. Both are in the page cache and on the disk, so
+        that the disk is not used during the measurement.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path, cut, part = (folder / f"{stem}{end}" for end in (".mcap", "-cut.mcap", ".part"))
@@ -76,7 +75,7 @@ def write(path: Path, seconds: int, *, compression: str, crc: bool) -> None:
         path: The file.
         seconds: Its duration.
         compression: Of the chunks: "zstd", or "" for none.
-        crc: Whether chunks have CRCs; if not, the summary has none either.
+        crc: Whether chunks and summary have CRCs.
     """
     streams = wrenches(seconds), odometries(seconds), transforms(seconds), static_transform(), images(seconds)
     with path.open("wb") as file:
@@ -122,7 +121,7 @@ def static_transform() -> Stream:
 
 
 def images(seconds: int) -> Stream:
-    """Images of noise, each made when it is its turn."""
+    """Images of noise, generated one by one."""
     rng = np.random.default_rng((SEED, 3))
     body = np.zeros(IMAGE_BYTES, dtype=np.uint8)
     template = cdr(build("sensor_msgs/msg/CompressedImage", header=header(0, "camera"), format="jpeg", data=body))
@@ -131,7 +130,7 @@ def images(seconds: int) -> Stream:
 
 
 def filled(topic: str, template: bytes, stamp_at: int, tails: FloatArray, rate_hz: int) -> Stream:
-    """Messages that differ in their stamp and in the float64s at their end.
+    """Messages that differ in their stamps and in the float64 numbers at their ends.
 
     Args:
         topic: "/odom".
@@ -163,7 +162,7 @@ def driven(seconds: int) -> FloatArray:
 
 
 def transform(parent: str, child: str) -> object:
-    """A message of one transform that changes nothing."""
+    """A message of one identity transform."""
     identity = build("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
     body = build("geometry_msgs/msg/Transform", translation=vector(0.0, 0.0, 0.0), rotation=identity)
     head = header(START_NS, parent)
