@@ -3,7 +3,7 @@
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
@@ -37,6 +37,8 @@ def map_in_order(
     elif workers < 2:
         yield from map(function, items)
     else:
+        from concurrent.futures import ProcessPoolExecutor  # which imports multiprocessing
+
         with ProcessPoolExecutor(workers, initializer=_Worker.listen) as pool:
             try:
                 with _no_interrupt():  # Python forgets one that comes while a process forks
