@@ -26,6 +26,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,8 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="keep the logs here, or use those that are there")
     options = parser.parse_args()
+    if find_spec("mcap_ros2") is None:
+        parser.error("mcap-ros2-support, one of the readers, is not installed: pip install -e '.[bench]'")
     logs, runs, rows = [], [], []
     for variant in VARIANTS:
         with tempfile.TemporaryDirectory() as scratch:
