@@ -181,7 +181,7 @@ def complaints(page):
     return [event["params"] for event in page.events if event["method"] in kinds]
 
 
-def test_it_opens_from_a_file_without_a_word_or_a_request(page):
+def test_it_opens_from_a_file_without_messages_or_requests(page):
     images = "[...document.querySelectorAll('figure img')]"
     assert page.run(f"{images}.map(image => image.complete && image.naturalWidth)") == [1400, 90]
     assert page.run("document.title") == "What a robot learnt"
@@ -193,7 +193,7 @@ def test_it_opens_from_a_file_without_a_word_or_a_request(page):
     assert all(url.startswith("data:") for url in sent[1:])
 
 
-def test_it_is_not_let_into_the_network_and_runs_no_other_script(page):
+def test_it_has_no_access_to_the_network_and_runs_no_other_script(page):
     refused = page.run("""new Promise(resolve => {
         const refused = [];
         document.addEventListener("securitypolicyviolation", event => {
@@ -209,7 +209,7 @@ def test_it_is_not_let_into_the_network_and_runs_no_other_script(page):
     assert complaints(page) != []
 
 
-def test_a_click_sorts_numbers_before_words_and_what_is_missing_last(page):
+def test_a_click_sorts_numbers_before_words_and_missing_values_last(page):
     assert sorted_as(page) == [None, None]
     length = "table:first-of-type th:nth-child(2) button"
     page.click(length)

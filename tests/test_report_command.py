@@ -1,4 +1,4 @@
-"""``navirl report``: one page that says what the files say."""
+"""``navirl report``: one page with the content of the files."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def page(work):
     return (work / "page.html").read_text()
 
 
-def test_it_tells_parameters_and_what_they_mean(work, page):
+def test_it_holds_parameters_and_their_meaning(work, page):
     document = json.loads((work / "reward.json").read_text())
     for one in document["parameters"]:
         low, high = (one["value"] + sign * 1.96 * one["standard_error"] for sign in (-1, 1))
