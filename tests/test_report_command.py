@@ -6,8 +6,8 @@ from base64 import b64decode
 from pathlib import Path
 
 import pytest
+from browser import CHROMIUM, Browser
 from click.testing import CliRunner
-from test_documents_page import CHROMIUM, Browser
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
