@@ -75,7 +75,7 @@ def test_demonstrations_come_back_as_they_were(demos):
                 assert new == old
 
 
-def test_a_file_says_how_far_people_strayed(demos):
+def test_a_file_holds_how_far_people_moved(demos):
     path, (watched, _) = demos
     ann, bob = read_json(path, "demonstrations")["demonstrations"][0]["tracks"]
     assert ann["spread_m"] == pytest.approx(watched.tracks[0].spread_m, abs=1e-6)
@@ -230,7 +230,7 @@ def test_a_path_through_an_occupied_cell_is_refused(demos):
         read_demonstrations(edited(path, block))
 
 
-def test_what_is_no_demonstrations_file_is_named(tmp_path):
+def test_other_files_are_refused_by_what_they_are(tmp_path):
     for content, message in (
         ("", "expected a JSON file of navirl demonstrations, found none"),
         ("[]", "expected navirl demonstrations (format 'navirl/demonstrations'), found other JSON"),
@@ -273,7 +273,7 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
         read_reward(path)
 
 
-def test_files_appear_whole_or_not_at_all(tmp_path):
+def test_files_appear_complete_or_not_at_all(tmp_path):
     path = tmp_path / "x.json"
     write_json(path, "metrics", {"a": 1}, force=False)
     old = path.read_text()
@@ -358,7 +358,7 @@ def test_rows_of_different_lengths_are_refused(with_profile, lines):
     [lambda p: p["values"].__setitem__(1, None), lambda p: p["values"].reverse(), lambda p: p.update(parameter="c9")],
     ids=["no number", "not ascending", "of no parameter"],
 )
-def test_profiles_that_are_none_are_refused(with_profile, change):
+def test_contradictory_profiles_are_refused(with_profile, change):
     path, _ = with_profile
     with pytest.raises(ArtefactError, match="profile"):
         read_reward(edited(path, lambda document: change(document["profiles"][0])))

@@ -1,4 +1,4 @@
-"""Reports as Markdown and as a page: what is written is what can be read back."""
+"""Reports as text, Markdown and HTML: what is written can be read back."""
 
 import re
 from base64 import b64decode, b64encode
@@ -68,14 +68,14 @@ def picture(tmp_path):
     return tmp_path / "red.png"
 
 
-def test_marks_are_told_from_what_only_looks_like_them():
+def test_marks_differ_from_characters_that_look_like_them():
     runs = [("a ", Mark.NONE), ("b*", Mark.CODE), (" ", Mark.NONE), ("c d", Mark.STRONG), (".", Mark.NONE)]
     assert runs_of("a `b*` **c d**.") == tuple(Run(text, mark) for text, mark in runs)
     for text in ("2 ** 3 ** 4", "a ` b", "``a``", "``a`", "** a **", "****", "a*b*c", "`", "**a"):
         assert runs_of(text) == (Run(text, Mark.NONE),)
 
 
-def test_blanks_become_one_space_and_what_no_file_can_hold_a_sign():
+def test_blanks_become_one_space_and_unprintable_characters_a_sign():
     assert plain_of("  a\r\n\t b\u2028c\x00\ud800 ") == "a b c\ufffd\ufffd"
     assert plain_of("3\u00a0m") == "3\u00a0m"
 
@@ -139,7 +139,7 @@ def test_rows_of_a_markdown_table_keep_their_cells(rows):
         ("x**(a)** x", "x<strong>(a)</strong> x"),
     ],
 )
-def test_markdown_shows_what_means_something_as_it_stands(text, written):
+def test_markdown_escapes_its_own_characters(text, written):
     assert markdown(Paragraph(text)) == written
 
 
@@ -176,7 +176,7 @@ Made by a test.
 """
 
 
-def test_a_whole_report_in_markdown(picture, tmp_path):
+def test_a_report_in_markdown(picture, tmp_path):
     report = Report(
         "Two `drives`",
         (
@@ -197,7 +197,7 @@ def test_a_whole_report_in_markdown(picture, tmp_path):
     assert to_markdown(report, tmp_path) == WHOLE
 
 
-def test_a_whole_report_as_text(picture):
+def test_a_report_as_text(picture):
     blocks = (
         Heading("Log `a`"),
         Bullets(("2 s", "clock: **wrong**")),
@@ -244,7 +244,7 @@ def test_pictures_are_in_the_page_byte_for_byte(picture, tmp_path):
 
 
 @pytest.mark.parametrize("write", [to_html, lambda report: to_markdown(report, Path())], ids=["page", "markdown"])
-def test_what_is_no_picture_is_named(write, tmp_path):
+def test_files_that_are_not_pictures_are_refused(write, tmp_path):
     (tmp_path / "text.png").write_text("no picture")
     (tmp_path / "plot.pdf").write_bytes(b"%PDF")
     for name, problem in (
@@ -277,7 +277,7 @@ def test_names_of_headings_are_their_words():
     assert [heading["id"] for heading in page.all("h2")] == ["what-was-seen", "grösse", "距離", "section", "grösse-2"]
 
 
-def test_the_page_is_whole_and_asks_for_nothing(picture):
+def test_the_page_is_complete_and_requests_nothing(picture):
     blocks = (
         Heading("A"),
         Table((Column("who"), Column("n")), (("a", 1), ("b", 2)), note="By **hand**."),
@@ -332,6 +332,6 @@ def test_equal_reports_give_equal_bytes(picture):
     assert to_markdown(report(), picture.parent) == to_markdown(report(), picture.parent)
 
 
-def test_what_a_caller_got_wrong_is_told():
+def test_a_heading_needs_a_level_below_the_title():
     with pytest.raises(ValueError, match="2 to 6, found 1"):
         Heading("a", 1)

@@ -283,7 +283,9 @@ def test_an_uncertain_parameter_is_named(evidence):
 def test_few_participants_are_too_few_for_errors_by_participant(evidence):
     content = content_of(evidence)
     (line,) = warnings(content)
-    assert line.startswith("errors by participant come from 4 participants: they are rough below 10")
+    assert line.startswith(
+        "errors by participant rest on 4 participants: they are rough with fewer than 10, and too small"
+    )
     assert warnings({**content, "participants": ["p01"]}) == []
 
 

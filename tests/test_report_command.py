@@ -1,4 +1,4 @@
-"""``navirl report``: one page that says what the files say."""
+"""``navirl report``: one page with the content of the files."""
 
 import json
 import re
@@ -6,8 +6,8 @@ from base64 import b64decode
 from pathlib import Path
 
 import pytest
+from browser import CHROMIUM, Browser
 from click.testing import CliRunner
-from test_documents_page import CHROMIUM, Browser
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
@@ -34,7 +34,7 @@ def page(work):
     return (work / "page.html").read_text()
 
 
-def test_it_tells_parameters_and_what_they_mean(work, page):
+def test_it_holds_parameters_and_their_meaning(work, page):
     document = json.loads((work / "reward.json").read_text())
     for one in document["parameters"]:
         low, high = (one["value"] + sign * 1.96 * one["standard_error"] for sign in (-1, 1))

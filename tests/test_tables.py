@@ -208,5 +208,5 @@ def test_what_is_no_table_is_refused():
         Table((Column("a"), Column("b")), ((1, 2), (1,)))
     with pytest.raises(ValueError, match="at least one column"):
         Table((), ())
-    with pytest.raises(TypeError, match=r"a text, a number, a composite or None, found \[1\]"):
+    with pytest.raises(TypeError, match=r"a text, a number, a composite or None in a cell, found \[1\]"):
         one_column(Column("a"), [1])

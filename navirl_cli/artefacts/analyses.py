@@ -1,4 +1,4 @@
-"""What reward files say of a fit's certainty beyond its standard errors."""
+"""Bootstrap, profile likelihoods and cross-validation in reward files."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from navirl_cli.irl.validation import Validation
 
 
 def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
-    """Replicates, with their standard errors and 95 % intervals."""
+    """Bootstrap draws with their standard errors and 95 % intervals."""
     lower, upper = found.interval()
     return {
         "seed": found.seed,
@@ -49,23 +49,25 @@ def profile_of(document: dict[str, Any], names: Sequence[str], path: str) -> Pro
         path: The file, for messages.
 
     Raises:
-        ArtefactError: It is of no parameter, or its lists do not fit each other.
+        ArtefactError: Its parameter is unknown, or its lists do not fit each other.
     """
     name = document["parameter"]
     if name not in names:
-        raise ArtefactError(f"{path}: holds a profile of {name}, and the reward has {', '.join(names)}")
+        raise ArtefactError(f"{path}: profiles: expected one of {', '.join(names)}, found a profile of {name}")
     values = row(document["values"])
     relative = row(document["relative_log_likelihood"])
     theta = [row(one) for one in document["theta"]]
-    told = np.isfinite(values).all() and np.isfinite(relative).all() and (np.diff(values) > 0).all()
+    ascends = np.isfinite(values).all() and np.isfinite(relative).all() and (np.diff(values) > 0).all()
     fits = len(values) == len(relative) == len(theta) > 1 and all(len(one) == len(names) for one in theta)
-    if not (told and fits):
-        raise ArtefactError(f"{path}: the profile of {name} needs ascending values, and at each a likelihood and a fit")
+    if not (ascends and fits):
+        raise ArtefactError(
+            f"{path}: the profile of {name} needs ascending values, with a likelihood and parameters for each"
+        )
     return Profile(name, values, relative, np.array(theta), document["level"], document["lower"], document["upper"])
 
 
 def validation_document(found: Validation) -> dict[str, Any]:
-    """Held-out results by left-out participant."""
+    """Cross-validation by participant left out."""
     return {
         "left_out": list(found.participants),
         "steps": found.steps.tolist(),

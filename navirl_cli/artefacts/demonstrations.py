@@ -1,4 +1,4 @@
-"""Demonstrations as a file."""
+"""Demonstrations files."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -18,9 +18,9 @@ from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
 from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
 
-#: Numbers beyond these are refused: no trial holds them, and they would cost memory without end. In the lists' units.
+#: Larger numbers are refused: no trial holds them, and they would need unlimited memory. In the units of the lists.
 _MOST = {"t_s": 1e6, "x_m": 1e8, "y_m": 1e8, "yaw_rad": 1e6, "force_x_n": 1e6, "force_y_n": 1e6}
-#: Decimals of metres, radians and newtons in files: a micrometre is below every sensor.
+#: Decimals of metres, radians and newtons in files. No sensor resolves a micrometre.
 DECIMALS = 6
 
 
@@ -45,7 +45,7 @@ def demonstrations_document(
 
 
 def settings_document(settings: ExtractSettings, options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
-    """The choices of an extraction, for the reader of a file.
+    """The settings of an extraction.
 
     Args:
         settings: Of the extraction.
@@ -63,7 +63,7 @@ def settings_document(settings: ExtractSettings, options: LoadOptions, map_file:
 
 
 def gain_document(gains: Sequence[tuple[str, Gain | None]]) -> dict[str, Any] | None:
-    """The gains of recordings, each with its log's name, and the one of all together; None where nobody pushed."""
+    """The gain of each recording with the name of its log, and of all together. None if no trial holds a push."""
     known = [(log, gain) for log, gain in gains if gain is not None]
     if not known:
         return None
@@ -147,7 +147,7 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
 
 
 def _track_written(track: PersonTrack) -> dict[str, Any]:
-    """How a person moved, as JSON."""
+    """A person's motion as JSON."""
     return {
         "name": track.name,
         "spread_m": round(track.spread_m, DECIMALS),
@@ -222,7 +222,7 @@ def _numbers(content: Mapping[str, Any], name: str, bounds: tuple[float, float] 
 
 
 def _around(grid: Grid) -> tuple[tuple[float, float], tuple[float, float]]:
-    """From where to where x and y may be, m: on the map, or beside it by no more than its length."""
+    """Bounds of x and of y, m: the map, and as much as its length around it."""
     rows, columns = grid.shape
     beside = max(rows, columns) * grid.resolution_m
     (x, y), (width, height) = grid.origin_m, (columns * grid.resolution_m, rows * grid.resolution_m)
@@ -236,9 +236,9 @@ def _contact(content: Mapping[str, Any]) -> Contact:
 
 
 def _track(content: Mapping[str, Any]) -> PersonTrack:
-    """How a person moved in a demonstration."""
+    """A person's motion in a demonstration."""
     t, x, y = (_numbers(content, key) for key in ("t_s", "x_m", "y_m"))
     try:
         return PersonTrack(content["name"], t, np.stack([x, y], axis=1))
-    except DemonstrationError as error:  # which does not know whose track it is
+    except DemonstrationError as error:  # which does not name the demonstration
         raise ValueError(str(error)) from error

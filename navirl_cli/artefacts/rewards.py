@@ -1,4 +1,4 @@
-"""Learnt rewards as files."""
+"""Reward files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from navirl_cli.irl.status import Status
 
 @dataclass(frozen=True, eq=False)
 class Search(ByContent):
-    """The way of the search that found a maximum, from its start; a corrected bias is not in it."""
+    """The steps of the search that found the maximum, from its start, without a bias correction."""
 
     #: (m,) nats.
     log_likelihood: FloatArray
@@ -33,24 +33,24 @@ class Search(ByContent):
 
 @dataclass(frozen=True, eq=False)
 class LearntReward(ByContent):
-    """A reward as read back from its file."""
+    """A reward as read from its file."""
 
     reward: Reward
-    #: (k, k), NaN where the data held no information.
+    #: (k, k), NaN for parameters without a standard error.
     covariance: FloatArray
-    #: Side of the cells that it was learnt on, m.
+    #: Side of the cells on which it was learnt, m.
     resolution_m: float
-    #: Ids of the demonstrations that it was learnt from.
+    #: Ids of the demonstrations from which it was learnt.
     demonstrations: tuple[str, ...]
     #: How the fit ended.
     status: Status
-    #: Profile likelihoods that were followed.
+    #: Profile likelihoods.
     profiles: tuple[Profile, ...] = ()
-    #: None of files from before it was kept.
+    #: None for files from before it was written.
     search: Search | None = None
 
     def as_prior(self) -> Prior:
-        """What this fit leaves to the next one.
+        """The prior that this fit gives to the next one.
 
         Raises:
             RewardError: The fit did not reach its maximum, or its covariance is not positive definite.
@@ -70,14 +70,14 @@ def reward_document(
     analyses: Analyses | None = None,
     learnt_from: str = "all",
 ) -> dict[str, Any]:
-    """A fit, and what was asked of it besides, as the content of a reward file.
+    """A fit with its analyses as the content of a reward file.
 
     Args:
         fit: The fit.
-        demonstrations: Those that it was learnt from.
+        demonstrations: Those from which it was learnt.
         inputs: Files that were read.
         resolution_m: Side of the cells, m.
-        analyses: What was asked besides.
+        analyses: Bootstrap, profiles and cross-validation, where they were asked for.
         learnt_from: "all" steps or those during "contact".
     """
     analyses = analyses or Analyses()
@@ -142,7 +142,7 @@ def read_reward(path: Path) -> LearntReward:
     """A reward of a file.
 
     Raises:
-        ArtefactError: As in :func:`read_json`, or the parameters are none of a reward.
+        ArtefactError: As in :func:`read_json`, or the parameters are not those of a reward.
     """
     return learnt_of(read_json(path, "reward"), str(path))
 
@@ -155,7 +155,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         path: Where it comes from, for messages.
 
     Raises:
-        ArtefactError: The parameters are none of a reward.
+        ArtefactError: The parameters are not those of a reward.
     """
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
@@ -179,10 +179,10 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
 
 
 def _search(content: Mapping[str, Any] | None, count: int, path: str) -> Search | None:
-    """The way of the search in a file.
+    """The steps of the search in a file.
 
     Raises:
-        ArtefactError: There are not as many values of each parameter as of the likelihood.
+        ArtefactError: A parameter does not have one value for each likelihood.
     """
     if content is None:
         return None

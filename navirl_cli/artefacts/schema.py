@@ -1,7 +1,7 @@
-"""Whether JSON fits a schema: the part of JSON Schema (draft 2020-12) that the schemas of navirl use.
+"""A check of JSON against a schema, for the part of JSON Schema (draft 2020-12) that the schemas of navirl use.
 
-The package jsonschema takes longer to import than a small file to read; tests hold this check to its verdicts
-(tests/test_json_schema.py). Numbers must be finite here, which JSON Schema does not ask.
+The package jsonschema takes longer to import than a small file to read. tests/test_json_schema.py compares the verdicts
+of both. Numbers must be finite here, which JSON Schema does not require.
 """
 
 import re
@@ -13,16 +13,16 @@ from typing import Any, TypeAlias
 from navirl_cli.errors import brief
 
 Schema: TypeAlias = Mapping[str, Any]
-#: The way to a value from the document's top: names of fields and numbers of items.
+#: The path to a value from the top of the document: names of fields and numbers of items.
 Place: TypeAlias = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What does not fit, and where."""
+    """A value that does not fit the schema."""
 
     place: Place
-    #: Expected and found.
+    #: What was expected and found.
     text: str
 
     def __str__(self) -> str:
@@ -31,27 +31,27 @@ class Problem:
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it; what is nested is only counted."""
+    """A value as a message shows it. Lists and objects are shown by their size."""
     if isinstance(value, list):
         return f"a list of {len(value)} items"
     return f"an object of {len(value)} fields" if isinstance(value, dict) else brief(value)
 
 
 def first_problem(document: object, schema: Schema) -> Problem | None:
-    """The first place at which a document does not fit a schema.
+    """The first value that does not fit a schema, or None.
 
     Args:
         document: As parsed from JSON.
-        schema: Of the keywords below and annotations, without circles of references.
+        schema: With the keywords below and annotations; references must not be circular.
 
     Raises:
-        ValueError: The schema has a keyword that is not known here.
+        ValueError: The schema has another keyword.
     """
     return next(_problems(document, schema, schema, ()), None)
 
 
 def _problems(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[Problem]:
-    """Where a value does not fit, in the order of the schema."""
+    """What does not fit, in the order of the schema."""
     for keyword, wanted in schema.items():
         if keyword in _ANNOTATIONS:
             continue
@@ -96,8 +96,8 @@ def _is_one_of(value: object, wanted: list[object]) -> bool:
 
 
 _NUMBER = (int, float)
-#: By keyword: values of which type it speaks of, whether one fits, and what it expects. True and false count as numbers
-#: here, but no schema allows them beside a bound.
+#: By keyword: the type of values that it applies to, whether a value fits, and what is expected. True and false count
+#: as numbers here, but no schema allows them beside a bound.
 _PLAIN: Mapping[str, tuple[Any, Callable[[Any, Any], bool], Callable[[Any], str]]] = {
     "type": (
         object,
@@ -118,7 +118,7 @@ _PLAIN: Mapping[str, tuple[Any, Callable[[Any, Any], bool], Callable[[Any], str]
 
 
 def _reference(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[Problem]:
-    """A schema that stands elsewhere in the same file."""
+    """A schema elsewhere in the same file."""
     target: Any = root
     for name in schema["$ref"].removeprefix("#/").split("/"):
         target = target[name]
@@ -140,7 +140,7 @@ def _properties(value: Any, schema: Schema, root: Schema, place: Place) -> Itera
 
 
 def _additional(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[Problem]:
-    """Fields that "properties" does not name: forbidden, or all of one schema."""
+    """Fields that "properties" does not name: forbidden, or all with one schema."""
     wanted = schema["additionalProperties"]
     if isinstance(value, dict):
         for name in value:
@@ -160,7 +160,7 @@ def _items(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[P
 
 
 def _one_of(value: Any, schema: Schema, root: Schema, place: Place) -> Iterator[Problem]:
-    """Exactly one of several; where none fits, what the last one expects."""
+    """Exactly one of several schemas. If none fits, the problem of the last one is reported."""
     found = [next(_problems(value, one, root, place), None) for one in schema["oneOf"]]
     if found.count(None) > 1:
         yield Problem(place, f"expected what only one of {len(found)} choices allows, found {shown(value)}")

@@ -1,4 +1,4 @@
-"""JSON files, versioned, checked against their schema, written whole."""
+"""JSON files with a version. They are checked against their schema when they are read."""
 
 import json
 import re
@@ -21,35 +21,35 @@ from navirl_cli.files import replacing
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
-def write_json(path: Path, kind: str, content: Mapping[str, Any], *, force: bool) -> None:
+def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: bool) -> None:
     """Write an artefact.
 
     Args:
         path: The file.
-        kind: "demonstrations", "reward", "metrics" or "study".
+        artefact: "demonstrations", "reward", "metrics" or "study".
         content: Without the fields that name format and version.
         force: Whether to replace an existing file.
 
     Raises:
         ArtefactError: The file cannot be written.
     """
-    document = {"format": f"navirl/{kind}", "version": VERSION, "navirl": __version__, **content}
+    document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
     with replacing(path, force=force) as temporary:
         temporary.write_text(json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
 
 
-def read_json(path: Path, kind: str) -> dict[str, Any]:
+def read_json(path: Path, artefact: str) -> dict[str, Any]:
     """Read an artefact and check it against its schema.
 
     Args:
         path: The file.
-        kind: As in :func:`write_json`.
+        artefact: As in :func:`write_json`.
 
     Returns:
         Its content in the present version, whichever version of navirl wrote it.
 
     Raises:
-        ArtefactError: The file is missing, no JSON, of another kind, or breaks the schema.
+        ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
     try:
         document = _parsed(path.read_text(encoding="utf-8"))
@@ -57,25 +57,25 @@ def read_json(path: Path, kind: str) -> dict[str, Any]:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
-        raise ArtefactError(f"{path}: expected a JSON file of navirl {kind}, found none ({error}){hint}") from error
+        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
     found = document.get("format") if isinstance(document, dict) else None
-    if found != f"navirl/{kind}":
+    if found != f"navirl/{artefact}":
         what = f"a file of format {brief(found)}" if isinstance(found, str) else "other JSON"
-        raise ArtefactError(f"{path}: expected navirl {kind} (format 'navirl/{kind}'), found {what}")
+        raise ArtefactError(f"{path}: expected navirl {artefact} (format 'navirl/{artefact}'), found {what}")
     if not is_known(document.get("version")):
         other = shown(document.get("version"))
         raise ArtefactError(f"{path}: version: expected 1 to {VERSION}, found {other}; later ones need a later navirl")
-    problem = first_problem(upgraded(document, kind), _schema(kind))
+    problem = first_problem(upgraded(document, artefact), _schema(artefact))
     if problem is not None:
-        raise ArtefactError(f"{path}: breaks the schema of navirl {kind} at {problem}")
+        raise ArtefactError(f"{path}: breaks the schema of navirl {artefact} at {problem}")
     return dict(document)
 
 
 def _parsed(text: str) -> Any:
-    """JSON without NaN and Infinity, and without halves of surrogate pairs, which no text file can hold.
+    """Parse JSON. NaN, Infinity and halves of surrogate pairs are refused.
 
     Raises:
-        ValueError: It is no such JSON.
+        ValueError: The text is not JSON, or holds one of these.
     """
     document = json.loads(text, parse_constant=_refuse_constant)
     if _SURROGATE.search(text):
@@ -84,34 +84,34 @@ def _parsed(text: str) -> Any:
 
 
 def _refuse_constant(name: str) -> float:
-    """NaN and Infinity are no JSON."""
+    """Refuse NaN and Infinity, which JSON does not have."""
     raise ValueError(f"{name} is no JSON number")
 
 
 @cache
-def _schema(kind: str) -> Any:
-    """The schema of a kind of artefact."""
-    return json.loads(schema_path(kind).read_text(encoding="utf-8"))
+def _schema(artefact: str) -> Any:
+    """The schema of an artefact."""
+    return json.loads(schema_path(artefact).read_text(encoding="utf-8"))
 
 
-def schema_path(kind: str) -> Path:
-    """The JSON Schema of a kind of artefact: inside an installed package, or at the top of a source tree."""
+def schema_path(artefact: str) -> Path:
+    """The file of an artefact's JSON Schema: inside an installed package, or at the top of a source tree."""
     package = Path(__file__).parent.parent
-    name = f"{kind}.schema.json"
+    name = f"{artefact}.schema.json"
     inside = package / "schemas" / name
     return inside if inside.exists() else package.parent / "schemas" / name
 
 
 def number(value: float) -> float | None:
-    """A number as JSON takes it, which knows no NaN and no infinity."""
+    """A number for JSON: None for NaN and infinity."""
     return float(value) if isfinite(value) else None
 
 
 def row(values: list[float | None]) -> FloatArray:
-    """(k,) numbers of a list as :func:`numbers` writes one."""
+    """(k,) numbers of a list that :func:`numbers` wrote; null becomes NaN."""
     return np.array(values, dtype=float)
 
 
 def numbers(array: FloatArray) -> list[Any]:
-    """Lists of numbers, nested as the array is."""
+    """An array as nested lists for JSON."""
     return [numbers(one) if one.ndim else number(float(one)) for one in array]

@@ -1,23 +1,23 @@
-"""Versions of the artefacts' formats: files of older ones are brought to the present one when they are read."""
+"""Versions of the file formats. Files of an older version are upgraded when they are read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-#: The present version, of all kinds.
+#: The present version of all artefacts.
 VERSION = 2
 
 
-def _at(value: Any, way: list[str]) -> Iterator[Any]:
+def _at(value: Any, path: list[str]) -> Iterator[Any]:
     """All values at a place."""
-    if not way:
+    if not path:
         yield value
         return
-    if way[0] == "*":
+    if path[0] == "*":
         inside = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
     else:
-        inside = [value[way[0]]] if isinstance(value, dict) and way[0] in value else []
+        inside = [value[path[0]]] if isinstance(value, dict) and path[0] in value else []
     for one in inside:
-        yield from _at(one, way[1:])
+        yield from _at(one, path[1:])
 
 
 def _objects(document: Any, way: list[str]) -> Iterator[dict[str, Any]]:
@@ -41,15 +41,15 @@ def _participant(demonstration: Mapping[str, Any]) -> str:
     return str(demonstration.get("id")).rpartition("/")[0]
 
 
-#: Metrics that have another name since version 1, wherever values stand by metric.
+#: Metrics of version 1 that were renamed, and where a file lists values by metric.
 _METRICS = {"peak_n": "peak_force_n", "impulse_ns": "impulse_n_s"}
 _BY_METRIC = (
     *(f"groups/*/{name}" for name in ("mean", "standard_deviation", "half_interval", "monte_carlo_error", "exact")),
     "demonstrations/*/metrics",
     "pairs/*/metrics",
 )
-#: By kind: fields of version 1 (navirl 0.1.0) that have another name since, in this order. A star stands for every item
-#: of a list and every value of an object.
+#: By artefact: fields of version 1 (navirl 0.1.0) and their present names, in the order of renaming. A star stands for
+#: every item of a list and every value of an object.
 _RENAMED: Mapping[str, Mapping[str, str]] = {
     "demonstrations": {
         "demonstrations/*/contacts/*/peak_n": "peak_force_n",
@@ -125,13 +125,13 @@ def is_known(version: object) -> bool:
     return isinstance(version, int) and not isinstance(version, bool) and 1 <= version <= VERSION
 
 
-def upgraded(document: dict[str, Any], kind: str) -> dict[str, Any]:
-    """Bring a document to the present version.
+def upgraded(document: dict[str, Any], artefact: str) -> dict[str, Any]:
+    """Upgrade a document to the present version.
 
     Args:
-        document: As read from a file, of a known version but not yet checked: whatever is not where version 1 has it
-            stays as it is, and the check against the schema finds it. Changed in place.
-        kind: Of artefact.
+        document: As read from a file, of a known version, not yet checked. Fields that are not where version 1 has them
+            are left for the check against the schema. Changed in place.
+        artefact: As in :func:`navirl_cli.artefacts.store.write_json`.
 
     Returns:
         The document.

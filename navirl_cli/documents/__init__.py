@@ -1,1 +1,1 @@
-"""Documents for a reader: blocks of text, tables and pictures -> Markdown, or one HTML file."""
+"""Reports: blocks of text, tables and pictures, written as text, Markdown, HTML, CSV, LaTeX or JSON."""

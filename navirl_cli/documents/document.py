@@ -1,7 +1,6 @@
-"""What a report consists of, whatever it is written as.
+"""The blocks of a report, for every format.
 
-All texts are plain, with the two marks of :mod:`navirl_cli.documents.inline`; whatever else they hold is shown as it
-stands.
+All texts are plain, with the two marks of :mod:`navirl_cli.documents.inline`. All other characters are shown unchanged.
 """
 
 from dataclasses import dataclass
@@ -18,10 +17,10 @@ PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Heading:
-    """A section's title; those of level 2 make the table of contents."""
+    """The title of a section. Titles of level 2 make the table of contents."""
 
     text: str
-    #: 2 to 6; level 1 is the report's title.
+    #: 2 to 6. Level 1 is the title of the report.
     level: int = 2
 
     def __post_init__(self) -> None:
@@ -39,7 +38,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Bullets:
-    """An unordered list, one text an item."""
+    """An unordered list with one text for each item."""
 
     items: tuple[str, ...]
 

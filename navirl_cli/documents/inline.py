@@ -1,7 +1,7 @@
-"""Texts of a report: plain, with `code` and **strong** as the only marks.
+"""Texts of a report: plain text with two marks, `code` and **strong**, in every format.
 
-Code stands between single backticks, strong text between double asterisks that touch it; neither holds the other. What
-does not fit this, as a lone asterisk or backtick, is shown as it stands.
+Code is enclosed in single backticks. Strong text is enclosed in double asterisks that touch it. Marks do not nest. All
+other characters are shown unchanged, lone asterisks and backticks included.
 """
 
 import re
@@ -13,15 +13,15 @@ _MARKED = re.compile(
     r"(?<!`)`(?P<code>[^`]+)`(?!`)"
     r"|(?<!\*)\*\*(?=[^\s*])(?P<strong>.*?[^\s*])\*\*(?!\*)"
 )
-#: Whatever breaks a line or is blank, other than spaces that are not to break.
+#: Line breaks and blanks, without non-breaking spaces.
 _BLANK = re.compile(r"[ \t-\r\x1c-\x1f\x85\u2028\u2029]+")
-#: Characters that no HTML file may hold, or no file at all: names of files bring them along.
+#: Characters that are not allowed in HTML or in any file. Names of files can contain them.
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
-#: What has a meaning wherever it stands. Underscores inside of words have none, and an & only before a name.
+#: Characters with a meaning anywhere in Markdown. Underscores inside words have none; & has one before a name only.
 _ANYWHERE = re.compile(r"[\\`*\[\]<~$]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])|:(?=//)|(?<=www)\.|(?:(?<=\s)|^)#", re.I)
-#: What has a meaning where a paragraph begins: quotes, items, rules.
+#: Characters with a meaning at the start of a paragraph: quotes, items, rules.
 _AT_START = re.compile(r"^(\d*)(>|[.)](?=\s|$)|[-+](?=[\s-]|$))")
-#: A text up to where a long word, such as a hash, may be broken.
+#: Pieces between which a long word, such as a hash, may be broken.
 _PIECES = re.compile(r".*?\S{16}(?=\S{16})|.+")
 _LATEX = str.maketrans(
     {
@@ -44,7 +44,7 @@ _LATEX = str.maketrans(
 
 
 class Mark(StrEnum):
-    """How a piece of a text is set off."""
+    """How a piece of a text is marked."""
 
     NONE = "none"
     CODE = "code"
@@ -60,14 +60,14 @@ class Run:
 
 
 def runs_of(text: str) -> tuple[Run, ...]:
-    """Take a text apart at its marks.
+    """Split a text at its marks.
 
     Args:
-        text: Any text. Runs of blanks and line breaks become one space; control characters and halves of surrogate
-            pairs, which no file can hold, become U+FFFD.
+        text: Any text. Several blanks or line breaks become one space. Control characters and halves of surrogate pairs
+            become U+FFFD.
 
     Returns:
-        Its pieces in order, without the marks; none of them empty.
+        Its pieces in order, without the marks. No piece is empty.
     """
     text = _UNPRINTABLE.sub("\ufffd", _BLANK.sub(" ", text)).strip()
     runs: list[Run] = []
@@ -87,16 +87,16 @@ def text_of(text: str) -> str:
 
 
 def plain_of(text: str) -> str:
-    """A text without its marks, as for a window's title."""
+    """A text without its marks, for instance for the title of a window."""
     return "".join(run.text for run in runs_of(text))
 
 
 def markdown_of(text: str, *, cell: bool = False) -> str:
-    """A text on one line of Markdown, everything but its marks escaped.
+    """A text on one line of Markdown. All characters but the marks are escaped.
 
     Args:
         text: With marks.
-        cell: Whether it stands in a table, where bars separate the cells, in code too.
+        cell: Whether it is in a table, where a bar separates cells, in code too.
     """
     pieces: list[str] = []
     runs = runs_of(text)
@@ -128,13 +128,13 @@ def markdown_escaped(text: str, *, cell: bool = False) -> str:
 
 
 def latex_of(text: str) -> str:
-    """A text in LaTeX, everything but its marks escaped."""
+    """A text in LaTeX. All characters but the marks are escaped."""
     commands = {Mark.CODE: r"\texttt{%s}", Mark.STRONG: r"\textbf{%s}", Mark.NONE: "%s"}
     return "".join(commands[run.mark].replace("%s", run.text.translate(_LATEX)) for run in runs_of(text))
 
 
 def html_of(text: str) -> str:
-    """A text in HTML, its marks as elements and everything else escaped; long words may be broken."""
+    """A text in HTML. Marks become elements, all other characters are escaped, long words may be broken."""
     tags = {Mark.CODE: "code", Mark.STRONG: "strong"}
     pieces = []
     for run in runs_of(text):

@@ -14,10 +14,10 @@ def to_markdown(report: Report, folder: Path) -> str:
 
     Args:
         report: What to write.
-        folder: Where the text will lie; pictures are linked relative to it.
+        folder: Folder of the file that is written. Pictures are linked relative to it.
 
     Returns:
-        The text, which ends with a line break.
+        The text, with a line break at its end.
 
     Raises:
         ArtefactError: A picture is missing, or neither .png nor .svg.

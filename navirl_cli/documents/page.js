@@ -1,10 +1,10 @@
 "use strict";
 
-// Tables: a click on a column's header sorts by it: upwards, then downwards, then as written.
+// Tables: clicks on the header of a column sort by it in ascending, descending and original order.
 
 const words = new Intl.Collator("en", { numeric: true });
 
-// Numbers come first, then words, and what is missing last, whichever way a column is sorted.
+// Numbers come first, then words, then missing values, in both directions.
 function rank(cell) {
   return "missing" in cell.dataset ? 2 : "number" in cell.dataset ? 0 : 1;
 }

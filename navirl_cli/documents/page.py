@@ -1,4 +1,4 @@
-"""A report as one HTML file that needs nothing else: no network, no other file."""
+"""A report as one HTML file that needs no network and no other file."""
 
 import re
 from base64 import b64encode
@@ -13,7 +13,7 @@ from navirl_cli.documents.document import PNG_HEAD, Block, Bullets, Heading, Par
 from navirl_cli.documents.inline import html_of, plain_of
 from navirl_cli.documents.tables import MINUS, Cell, Table, is_missing, sort_key
 
-#: The class of a cell, by whether its column holds numbers.
+#: The class of a cell, by whether its column is numeric.
 _CLASS = {False: "", True: ' class="number"'}
 
 
@@ -24,7 +24,7 @@ def to_html(report: Report) -> str:
         report: What to write.
 
     Returns:
-        The page; the same report and pictures give the same text.
+        The page. The same report and pictures give the same text.
 
     Raises:
         ArtefactError: A picture is missing, or neither .png nor .svg.
@@ -41,7 +41,7 @@ def to_html(report: Report) -> str:
 
 
 def _head(title: str) -> str:
-    """Title, style and what the page may do: show what it holds and run the one script below, nothing else."""
+    """Title, style, and a policy that allows the page its own content and the one script below."""
     style = _resource("page.css")
     policy = (
         "default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -54,7 +54,7 @@ def _head(title: str) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             '<meta name="color-scheme" content="light dark">',
             f"<title>{escape(plain_of(title))}</title>",
-            '<link rel="icon" href="data:,">',  # without one a browser asks the server for it
+            '<link rel="icon" href="data:,">',  # without it a browser requests one from the server
             f"<style>{style}</style>",
         )
     )
@@ -67,12 +67,12 @@ def _resource(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """How a Content-Security-Policy names an inline style or script."""
+    """The name of an inline style or script in a Content-Security-Policy."""
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
 def _names(report: Report) -> list[str]:
-    """An id for every heading and "" for other blocks: its words, numbered where they repeat."""
+    """For each block: the id of a heading (its words, numbered where they repeat), "" for all others."""
     names: list[str] = []
     for block in report.blocks:
         if not isinstance(block, Heading):
@@ -88,7 +88,7 @@ def _names(report: Report) -> list[str]:
 
 
 def _contents(report: Report, names: list[str]) -> str:
-    """Links to the headings of level 2, or nothing where there are none."""
+    """Links to the headings of level 2; empty without such headings."""
     items = [
         f'<li><a href="#{name}">{html_of(block.text)}</a></li>'
         for block, name in zip(report.blocks, names, strict=True)
@@ -98,7 +98,7 @@ def _contents(report: Report, names: list[str]) -> str:
 
 
 def _block(block: Block, name: str) -> str:
-    """One block; `name` is a heading's id."""
+    """One block. `name` is the id of a heading."""
     match block:
         case Heading(text, level):
             return f'<h{level} id="{name}">{html_of(text)}</h{level}>'
@@ -113,7 +113,7 @@ def _block(block: Block, name: str) -> str:
 
 
 def _table(table: Table) -> str:
-    """A table that scrolls in itself, with what it is sorted by beside the cells."""
+    """A table that scrolls by itself. Its cells carry the values by which they are sorted."""
     head = [
         _cell(column.title, "th", f' scope="col"{_CLASS[right]}')
         for column, right in zip(table.columns, table.numeric, strict=True)
@@ -130,12 +130,12 @@ def _table(table: Table) -> str:
 
 
 def _row(cells: Iterable[str]) -> str:
-    """A table's row."""
+    """A row of a table."""
     return f"<tr>\n{_lines(cells)}\n</tr>"
 
 
 def _cells(row: tuple[Cell, ...], texts: tuple[str, ...], numeric: tuple[bool, ...]) -> list[str]:
-    """The cells of a row; the first one names the row, unless its column holds numbers."""
+    """The cells of a row. The first one is the header of the row, unless its column is numeric."""
     keys = [_sort_key(cell) for cell in row]
     cells = [_cell(text, "td", _CLASS[n] + key) for text, n, key in zip(texts, numeric, keys, strict=True)]
     if not numeric[0]:
@@ -149,7 +149,7 @@ def _cell(text: str, tag: str, attributes: str) -> str:
 
 
 def _sort_key(cell: Cell) -> str:
-    """What the script sorts a cell by, other than its text."""
+    """The attribute by which the script sorts a cell."""
     if is_missing(cell):
         return " data-missing"
     number = sort_key(cell)
@@ -157,7 +157,7 @@ def _sort_key(cell: Cell) -> str:
 
 
 def _picture(picture: Picture) -> str:
-    """A picture with its bytes, and its caption."""
+    """A picture, embedded, with its caption."""
     media_type, content = picture.read()
     size = _shown_size(content)
     attributes = f' width="{size[0]}" height="{size[1]}"' if size else ""
@@ -175,5 +175,5 @@ def _shown_size(content: bytes) -> tuple[int, int] | None:
 
 
 def _lines(parts: Iterable[str]) -> str:
-    """Parts, one a line."""
+    """Parts on lines of their own."""
     return "\n".join(parts)

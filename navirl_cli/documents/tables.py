@@ -1,6 +1,6 @@
-"""Tables of values, and how they are written: as text, CSV, Markdown, LaTeX or JSON; HTML is in :mod:`.page`.
+"""Tables of values, written as text, CSV, Markdown, LaTeX or JSON. :mod:`navirl_cli.documents.page` writes HTML.
 
-A cell is a value. Its column says how numbers look; all formats show the same words and the same digits.
+A cell is a value. The column defines how its numbers are shown. All formats show the same words and the same digits.
 """
 
 import csv
@@ -17,9 +17,9 @@ from navirl_cli.documents.inline import latex_of, markdown_of, text_of
 
 #: The minus sign of typeset text; plain text, CSV and Markdown use the ASCII hyphen.
 MINUS = "\N{MINUS SIGN}"
-#: What stands for a missing value in every format for readers; CSV leaves the cell empty.
+#: A missing value in the formats for readers. In CSV its cell is empty.
 MISSING = "-"
-#: More decimals than these, or more digits before the point, are written with an exponent.
+#: Numbers that need more decimals, or more digits before the point, are written with an exponent.
 _MOST_DECIMALS, _MOST_DIGITS = 9, 15
 
 
@@ -27,23 +27,23 @@ _MOST_DECIMALS, _MOST_DIGITS = 9, 15
 class Spread:
     """A value with its uncertainty or scatter: mean ± standard deviation, estimate ± standard error."""
 
-    #: In the unit of the column; NaN where there is no value.
+    #: In the unit of the column; NaN for a missing value.
     mean: float
-    #: In the same unit; NaN where it is not known.
+    #: In the same unit; NaN where it is unknown.
     std: float
 
 
 @dataclass(frozen=True)
 class Interval:
-    """From one value to another."""
+    """An interval between two values."""
 
-    #: In the unit of the column; NaN where the interval is not known.
+    #: In the unit of the column; NaN for a missing interval.
     lower: float
     #: In the same unit.
     upper: float
 
 
-#: None, NaN, and composites that begin with NaN, are missing values.
+#: None, NaN, the empty text, and composites that begin with NaN are missing values.
 Cell: TypeAlias = str | bool | int | float | Spread | Interval | None
 #: A value as CSV and JSON hold it.
 Plain: TypeAlias = str | bool | int | float | None
@@ -53,44 +53,44 @@ _PARTS: Mapping[type, tuple[str, str]] = {Spread: ("mean", "std"), Interval: ("l
 
 @dataclass(frozen=True)
 class Column:
-    """What a column holds and how its numbers look."""
+    """The name of a column and the format of its numbers."""
 
-    #: Name in CSV and JSON: lower case, with the unit of the values, as length_m.
+    #: Name in CSV and JSON, in lower case with the unit of the values: length_m.
     name: str
-    #: Title for readers, with the unit that is shown; the name where it is empty.
+    #: Title for readers, with the unit that is shown. The name where it is empty.
     heading: str = ""
-    #: Digits after the point; None: whole numbers as such, others so that the largest has ``significant`` digits.
+    #: Digits after the point. None: so many that the largest number has ``significant`` digits; integers have none.
     decimals: int | None = None
     significant: int = 4
-    #: Whether positive numbers have a plus sign, as differences do.
+    #: Whether positive numbers have a plus sign, as in differences.
     sign: bool = False
-    #: Factor from the unit of the values to the unit that is shown: 100 for percent.
+    #: Factor from the unit of the values to the unit that is shown, for instance 100 for percent.
     scale: float = 1.0
 
     @property
     def title(self) -> str:
-        """What stands above the column."""
+        """The title above the column."""
         return self.heading or self.name
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of values under columns.
+    """Rows of values in columns.
 
     Raises:
-        ValueError: There is no column, or a row has another number of cells.
-        TypeError: A cell holds something else than a value.
+        ValueError: There is no column, or a row does not have one cell for each column.
+        TypeError: A cell is not a value.
     """
 
-    #: At least one.
+    #: One or more.
     columns: tuple[Column, ...]
-    #: As many cells each as there are columns.
+    #: One cell for each column.
     rows: tuple[tuple[Cell, ...], ...]
-    #: Stands above.
+    #: Text above the table.
     caption: str = ""
-    #: Stands below: for instance why values are missing.
+    #: Text below the table, for instance why values are missing.
     note: str = ""
-    #: By column, whether it is numeric: it holds numbers and nothing else, missing values aside.
+    #: By column: whether all its values are numbers, missing values aside. A column without values is not numeric.
     numeric: tuple[bool, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -102,7 +102,7 @@ class Table:
                 raise ValueError(f"a table of {len(self.columns)} columns cannot take the row {row}")
             for cell in row:
                 if not (cell is None or isinstance(cell, str | Real | Spread | Interval)):
-                    raise TypeError(f"a cell holds a text, a number, a composite or None, found {cell!r}")
+                    raise TypeError(f"expected a text, a number, a composite or None in a cell, found {cell!r}")
         columns = (self.column(j) for j in range(len(self.columns)))
         object.__setattr__(self, "numeric", tuple(map(_is_numeric, columns)))
 
@@ -117,13 +117,13 @@ class Table:
         return tuple(row[j] for row in self.rows)
 
     def without_empty(self) -> "Table":
-        """The same without the columns in which all values are missing."""
+        """The table without the columns in which all values are missing."""
         kept = [j for j in range(len(self.columns)) if not all(map(is_missing, self.column(j)))]
         rows = tuple(tuple(row[j] for j in kept) for row in self.rows)
         return replace(self, columns=tuple(self.columns[j] for j in kept), rows=rows)
 
     def shown(self, minus: str = "-") -> list[tuple[str, ...]]:
-        """The rows as texts for a reader.
+        """The rows as texts for readers.
 
         Args:
             minus: The minus sign of numbers.
@@ -132,13 +132,13 @@ class Table:
         return list(zip(*columns, strict=True))
 
     def records(self) -> list[dict[str, Plain]]:
-        """The rows for programs: by the columns' names, composites as two numbers with suffixes, missing as None."""
+        """The rows for programs, by the names of the columns. Composites become two numbers with suffixes."""
         names, rows = _plain(self)
         return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def sort_key(cell: Cell) -> float | None:
-    """The number by which a cell is sorted: its value, mean or lower end; None for texts and missing values."""
+    """The number by which a cell is sorted: value, mean or lower end. None for texts and missing values."""
     first = _known(_parts(cell)[0])
     return float(first) if isinstance(first, Real) and not isinstance(first, bool) else None
 
@@ -149,7 +149,7 @@ def is_missing(cell: Cell) -> bool:
 
 
 def _plain(table: Table) -> tuple[list[str], list[list[Plain]]]:
-    """Names and rows with one plain value each."""
+    """Names of plain columns, and rows with one plain value for each."""
     names: list[str] = []
     columns: list[list[Plain]] = []
     for j, column in enumerate(table.columns):
@@ -172,7 +172,7 @@ def _parts(cell: Cell) -> tuple[Plain, ...]:
 
 
 def _known(value: Plain) -> Plain:
-    """A value of Python's own types; None for NaN and for the empty text."""
+    """A value as one of Python's own types. None for NaN and the empty text."""
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, str):
@@ -183,13 +183,13 @@ def _known(value: Plain) -> Plain:
 
 
 def _is_numeric(cells: Sequence[Cell]) -> bool:
-    """Whether all values of a column are numbers, and there is one at least."""
+    """Whether a column has values and all of them are numbers."""
     values = [cell for cell in cells if not is_missing(cell)]
     return bool(values) and all(sort_key(cell) is not None for cell in values)
 
 
 def _shown(column: Column, cells: Sequence[Cell], minus: str) -> list[str]:
-    """The cells of a column as texts, all numbers with the same digits."""
+    """The cells of a column as texts. All numbers have the same digits."""
     numbers = [_scaled(cell, column.scale) for cell in cells]
     style = _style(column, [value for parts in numbers for value in parts])
     texts = [[_number(value, style, minus) for value in parts] for parts in numbers]
@@ -197,7 +197,7 @@ def _shown(column: Column, cells: Sequence[Cell], minus: str) -> list[str]:
 
 
 def _scaled(cell: Cell, scale: float) -> list[float]:
-    """The known numbers of a cell in the unit that is shown; none of a text."""
+    """The numbers of a cell in the unit that is shown. Empty for texts and missing values."""
     if sort_key(cell) is None:
         return []
     known = [_known(part) for part in _parts(cell)]
@@ -220,13 +220,13 @@ def _style(column: Column, values: Sequence[float]) -> str:
 
 
 def _number(value: float, style: str, minus: str) -> str:
-    """A number; one that is rounded to zero has no sign."""
+    """A number as text. A number that is rounded to zero has no sign."""
     text = format(value, style)
     return text.lstrip("+-") if not text.strip("+-0.") else text.replace("-", minus)
 
 
 def _joined(cell: Cell, numbers: Sequence[str]) -> str:
-    """A cell as text, its numbers already written."""
+    """A cell as text, from its numbers as texts."""
     if is_missing(cell):
         return MISSING
     if isinstance(cell, bool):
@@ -237,7 +237,7 @@ def _joined(cell: Cell, numbers: Sequence[str]) -> str:
 
 
 class Format(StrEnum):
-    """How a table is written."""
+    """The format of a table."""
 
     TEXT = "text"
     JSON = "json"
@@ -255,7 +255,7 @@ def written(table: Table, how: Format = Format.TEXT) -> str:
 
     Args:
         table: The table.
-        how: CSV and JSON hold plain numbers in the values' own units, without caption and note.
+        how: The format. CSV and JSON hold plain numbers in the units of the values, without caption and note.
     """
     match how:
         case Format.JSON:
@@ -278,7 +278,7 @@ def _csv(table: Table) -> str:
 
 
 def _plain_text(table: Table) -> str:
-    """Columns aligned by their widest entry: numbers to the right, texts to the left."""
+    """Columns of the width of their widest entry: numbers right-aligned, texts left-aligned."""
     header = [column.title for column in table.columns]
     rows = [[text_of(text) for text in row] for row in (header, *table.shown())]
     lines = ["  ".join(row).rstrip() for row in _aligned(rows, table.numeric)]
@@ -286,7 +286,7 @@ def _plain_text(table: Table) -> str:
 
 
 def _markdown(table: Table) -> str:
-    """Header, rule and rows in columns of one width, between caption and note."""
+    """Header, rule and rows in aligned columns, between caption and note."""
     header = [column.title for column in table.columns]
     grid = [[markdown_of(text, cell=True) for text in row] for row in (header, *table.shown())]
     widths = [max(3, *(len(row[j]) for row in grid)) for j in range(len(header))]
@@ -298,7 +298,7 @@ def _markdown(table: Table) -> str:
 
 
 def _latex(table: Table) -> str:
-    """A booktabs tabular between caption and note, which are paragraphs."""
+    """A booktabs tabular. Caption and note are paragraphs above and below it."""
     header = [latex_of(column.title) for column in table.columns]
     rows = [[latex_of(text) for text in row] for row in table.shown(MINUS)]
     lines = [" & ".join(row) + r" \\" for row in (header, *rows)]

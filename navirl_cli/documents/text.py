@@ -1,4 +1,4 @@
-"""Blocks of a report as plain text, for a terminal."""
+"""Blocks of a report as plain text for a terminal."""
 
 from collections.abc import Iterable
 
@@ -8,10 +8,10 @@ from navirl_cli.documents.tables import Table, written
 
 
 def to_text(blocks: Iterable[Block]) -> str:
-    """Write blocks below each other, pictures by their captions.
+    """Write blocks below each other. A picture is replaced by its caption.
 
     Returns:
-        The text, without a line break at its end; an empty line follows each block but headings.
+        The text, without a line break at its end. An empty line follows each block other than headings.
     """
     text = ""
     for block in blocks:

@@ -1,4 +1,4 @@
-"""What ``navirl extract`` reports: its trials, its gains, and the cells that were published with a log."""
+"""What ``navirl extract`` reports: trials, gains, and the comparison with published cells."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import hypot, pi
@@ -33,12 +33,12 @@ _GAIN = (
 
 
 def trial_table(demonstrations: Sequence[Demonstration]) -> Table:
-    """One row a trial; direction and peak force are those of its strongest contact."""
+    """One row for each trial. The direction is that of the contact with the largest impulse."""
     notes = []
     if any(one.laid_out_m_s is not None for one in demonstrations):
-        notes.append("No duration: positions came without times.")
+        notes.append("Duration is missing: positions came without times.")
     if any(one.contacts is None for one in demonstrations):
-        notes.append("No contacts: forces were not read.")
+        notes.append("Contacts are unknown: forces were not read.")
     return Table(_TRIAL, tuple(map(_trial, demonstrations)), note=" ".join(notes))
 
 
@@ -63,7 +63,7 @@ def _trial(d: Demonstration) -> tuple[Cell, ...]:
 
 
 def gain_table(gain: Mapping[str, Any]) -> Table:
-    """The gain of each log, and of all together where there are several.
+    """The gain of each log, and of all together if there are several.
 
     Args:
         gain: As in a demonstrations file.
@@ -73,7 +73,7 @@ def gain_table(gain: Mapping[str, Any]) -> Table:
 
 
 def published_notes(results: Iterable[Extraction]) -> list[str]:
-    """How many paths have the cells that were published with their log."""
+    """The number of paths with the cells that were published with their log."""
     notes = []
     for result in results:
         different = [name for name, same in result.published.items() if not same]

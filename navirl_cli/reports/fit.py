@@ -18,7 +18,7 @@ from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter
 from navirl_cli.irl.uncertainty import condition_number, correlation
 
-#: Participants below which their scatter says little (Cameron and Miller 2015, J. Human Resources 50:317).
+#: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
 FEW = 10
 #: Correlation beyond which two parameters are to be read together.
 TIED = 0.95
@@ -27,7 +27,7 @@ _WIDTH = 1.96
 
 
 def report(content: Mapping[str, Any]) -> list[Block]:
-    """The fit and what was asked of it besides.
+    """The fit and its analyses.
 
     Args:
         content: Of the reward file.
@@ -87,7 +87,7 @@ def _interval(lower: float | None, upper: float | None) -> Interval | None:
 
 
 def _parameters(content: Mapping[str, Any]) -> tuple[Parameter, ...]:
-    """What is known of the parameters beside their values."""
+    """Units, bounds and meanings of the parameters."""
     return parameters_of(terms_with([one["name"] for one in content["parameters"]]))
 
 
@@ -97,7 +97,7 @@ def meanings_of_parameters(content: Mapping[str, Any]) -> Bullets:
 
 
 def correlation_table(content: Mapping[str, Any]) -> list[Block]:
-    """Correlations of the estimates; nothing where fewer than two have a standard error."""
+    """Correlations of the estimates. Empty if fewer than two have a standard error."""
     covariance = np.array(content["covariance"], dtype=float)
     matrix = correlation(covariance)
     names = [one["name"] for one in content["parameters"]]
@@ -111,7 +111,7 @@ def correlation_table(content: Mapping[str, Any]) -> list[Block]:
 
 
 def likelihood_table(content: Mapping[str, Any]) -> Table:
-    """How likely the demonstrated steps are under the fit and under what it is compared with."""
+    """Log-likelihood of the demonstrated steps under the fit, at the start, and under the uniform policy."""
     columns = (
         Column("policy"),
         Column("log_likelihood", "log-likelihood nats", decimals=4),
@@ -119,26 +119,26 @@ def likelihood_table(content: Mapping[str, Any]) -> Table:
     )
     policies = (
         ("fitted", content["log_likelihood"]),
-        ("at the start of the search", content["log_likelihood_initial"]),
-        ("all moves equally likely", content["log_likelihood_uniform"]),
+        ("start of the search", content["log_likelihood_initial"]),
+        ("uniform", content["log_likelihood_uniform"]),
     )
     return Table(columns, tuple((name, nats, nats / content["steps"]) for name, nats in policies))
 
 
 def counts(content: Mapping[str, Any]) -> str:
-    """How much the fit comes from, and what it took, in a line."""
+    """The data of the fit, and the effort, in one line."""
     data = f"{len(content['demonstrations'])} demonstrations of {people(content)}, {content['steps']} steps"
     return f"{data}; {content['iterations']} iterations, {content['evaluations']} evaluations from all starts."
 
 
 def people(content: Mapping[str, Any]) -> str:
-    """From how many participants the reward was learnt."""
+    """The number of participants from which the reward was learnt."""
     count = len(content["participants"])
     return f"{count} participant{'' if count == 1 else 's'}"
 
 
 def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
-    """How many draws there were."""
+    """The number of draws, and of those without a fit."""
     found = content["bootstrap"]
     if found is None:
         return []
@@ -154,7 +154,7 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
 
 
 def profile_table(content: Mapping[str, Any]) -> list[Block]:
-    """Intervals from the profile likelihoods that were followed."""
+    """Intervals from the profile likelihoods."""
     bounds = {one.name: (one.lower, one.upper) for one in _parameters(content)}
     columns = (
         Column("profile"),
@@ -173,14 +173,14 @@ def profile_table(content: Mapping[str, Any]) -> list[Block]:
 
 
 def _end(side: str, edge: float | None, last: float, bound: float) -> str:
-    """Why an interval has no end on one side; empty where it has one."""
+    """Why an interval is open on one side. Empty if it is closed."""
     if edge is not None:
         return ""
     return f"{side}, up to the parameter's bound {bound:g}" if last == bound else f"{side}, up to {last:.4g} at least"
 
 
 def validation_tables(content: Mapping[str, Any]) -> list[Block]:
-    """Held-out log-likelihoods by model, and how far features are from those expected."""
+    """Held-out log-likelihoods by model, and differences between demonstrated and expected features."""
     found = content["cross_validation"]
     if found is None:
         return []
@@ -220,7 +220,7 @@ def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -
 
 
 def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """What a user may not have meant."""
+    """Choices that the user may not have intended."""
     lines = []
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
@@ -258,8 +258,8 @@ def warnings(content: Mapping[str, Any]) -> list[str]:
     count = len(content["participants"])
     if 1 < count < FEW:
         lines.append(
-            f"errors by participant come from {count} participants: they are rough below {FEW}, and too small where "
-            "there are no more participants than parameters"
+            f"errors by participant rest on {count} participants: they are rough with fewer than {FEW}, and too "
+            "small unless participants outnumber parameters"
         )
     status = Status(content["status"])
     if status is not Status.CONVERGED:

@@ -1,4 +1,4 @@
-"""What ``navirl inspect`` reports: what a log holds, and what extract would take from it."""
+"""What ``navirl inspect`` reports: the content of a log, and the topics that extract would use."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -23,7 +23,7 @@ _ROLE = (Column("role"), Column("topic"), Column("reason"))
 
 
 def overview_report(view: Overview) -> list[Block]:
-    """A recording: its name, size and time, its topics, and what each topic is used for."""
+    """A recording: name, size, time, topics, and the role of each topic."""
     lines = [_duration(view), *(f"clock: {line}" for line in view.clocks)]
     lines += [f"frames: {view.frames}"] if view.frames else []
     flows = tuple(_flow(flow, view.reference_s) for flow in view.flows)
@@ -51,7 +51,7 @@ def _flow(flow: Flow, reference_s: float) -> tuple[Cell, ...]:
 
 
 def _verdict(view: Overview) -> list[Block]:
-    """Whether extract has what it needs, and what is missing, the needed roles first."""
+    """Whether the log has what extract needs, and the missing roles, those that are needed first."""
     missing = {name: choice.problem for name, choice in view.choices.items() if not choice.topics}
     order = sorted(missing, key=lambda name: name not in view.needed)
     needed = f"extract needs: {', '.join(view.needed)}" if view.needed else "extract has what it needs"
@@ -75,7 +75,7 @@ def _duration(view: Overview) -> str:
 
 
 def _when(t_ns: int) -> str:
-    """A time of receipt: a date, where the clock counts from 1970."""
+    """A time of receipt, as a date if the clock counts from 1970."""
     try:
         if t_ns > EARLIEST_NS:
             return f"{datetime.fromtimestamp(t_ns / NS_PER_S, UTC):%Y-%m-%d %H:%M:%S} UTC"

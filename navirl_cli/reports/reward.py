@@ -1,4 +1,4 @@
-"""The page of ``navirl report``: its words and tables."""
+"""The page of ``navirl report``."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -33,8 +33,8 @@ from navirl_cli.reports.fit import (
 )
 
 _FORMULA = (
-    "The reward of a step from s to s': r = c0 |s - s'| + a_g d(s)^2 + the sum over people p of "
-    "a_p exp(-sigma_p |s - s_p|^2), where d is the distance from the nominal path and s_p the position of p."
+    "The reward of a step from s to s' is `c0 |s - s'| + a_g d(s)^2 + sum_p a_p exp(-sigma_p |s - s_p|^2)`. The sum is "
+    "over people p at the positions s_p; d is the distance from the nominal path."
 )
 _CAPTIONS = {
     "paths": "Driven paths by condition; the line is thicker where the person pushed.",
@@ -42,7 +42,7 @@ _CAPTIONS = {
     "properties": "Properties of driven and learnt paths by group: mean and standard deviation.",
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
-#: Beside the paper's three, where they are known.
+#: The metrics of the paper and two more.
 METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 #: Rank below which a demonstration is reported as rare.
 _RARE = 0.01
@@ -105,7 +105,7 @@ def report_of(
 
 
 def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any]) -> str:
-    """What the page is about, and how the fit ended."""
+    """The data, and how the fit ended."""
     everyone = people({"participants": {one.participant for one in demonstrations}})
     return (
         f"{len(demonstrations)} demonstrations of {everyone}, and a navigation reward learnt from "
@@ -115,7 +115,7 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
 
 
 def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:
-    """What the reward means at the distance at which people were passed."""
+    """The meaning of the reward at the mean distance of passing."""
     seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
     seen = [distance for distance in seen if isfinite(distance)]
     passed = float(np.mean(seen)) if seen else float("nan")
@@ -123,13 +123,13 @@ def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, se
 
 
 def _sentence(one: Meaning) -> str:
-    """A meaning with its interval."""
+    """A quantity with its interval."""
     interval = f" ({one.lower:.3g} to {one.upper:.3g})" if isfinite(one.lower) else ""
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
 def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
-    """Rank by demonstration."""
+    """One row for each demonstration."""
     columns = (
         Column("demonstration"),
         Column("group"),
@@ -143,7 +143,7 @@ def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
 
 def _warnings(content: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
     """What a reader should know before trusting the numbers."""
-    lines = [f"{line[0].upper()}{line[1:]}." if line[:2].islower() else f"{line}." for line in warnings(content)]
+    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in warnings(content)]
     rare = ", ".join(one.id for one in ranks if one.rank < _RARE)
     if rare:
         lines.append(f"The policy rarely takes paths like those of {rare}.")
