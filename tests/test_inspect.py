@@ -158,10 +158,8 @@ def test_what_extract_would_take_follows_the_users_choice(inspect, navirl, tmp_p
     (view,), _ = inspect(path, "--topic", "wrench=/other_wrench")
     assert view["roles"]["wrench"] == {"topics": ["/other_wrench"], "reason": "named by `topic`", "problem": None}
     error = navirl("inspect", path, "--topic", "wrench=/odom", code=1).stderr
-    assert error == (
-        "navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or geometry_msgs/Wrench, found "
-        "nav_msgs/Odometry\n"
-    )
+    assert error.startswith("navirl: run.mcap: --topic wrench=/odom: expected geometry_msgs/WrenchStamped or ")
+    assert error.endswith(", found nav_msgs/Odometry\n")
 
 
 def test_missing_topics_are_reported_with_the_remedy(inspect, navirl, tmp_path):
