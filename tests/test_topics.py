@@ -8,6 +8,8 @@ from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import scan
 from navirl_cli.logs.roles.topics import ROLES, Topic, choose, refusal, short_name, topics_of
+from navirl_cli.logs.roles.message_types import WRENCHES
+from navirl_cli.logs.roles.topics import Topic, choose, refusal, short_name, topics_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -238,10 +240,10 @@ def test_a_topic_without_messages_is_reported(choose_topics, tmp_path):
     found = choose_topics({"/scan": "sensor_msgs/msg/LaserScan", "/map": GRID, "/a_pose": POSE})
     assert "if /a_pose is meant, `topic` odometry=/a_pose; record the robot's odometry" in found["odometry"].problem
     topics = topics_of([scan(tmp_path / "run.mcap")])
+    types = " or ".join(short_name(one.name) for one in WRENCHES)
     assert str(refusal("run.mcap", topics, found["wrench"])) == (
-        "run.mcap: no wrench: expected a topic of type geometry_msgs/WrenchStamped or geometry_msgs/Wrench; record the "
-        "force-torque sensor's topic, for example with ros2_control's force_torque_sensor_broadcaster, or extract with "
-        "`no_wrench`; the log holds "
+        f"run.mcap: no wrench: expected a topic of type {types}; record the force-torque sensor's topic, for example "
+        "with ros2_control's force_torque_sensor_broadcaster, or extract with `no_wrench`; the log holds "
         "/a_pose (geometry_msgs/PoseStamped), /map (nav_msgs/OccupancyGrid), /scan (sensor_msgs/LaserScan)"
     )
     empty = nav.Log().write(tmp_path / "run.mcap")

@@ -20,9 +20,9 @@ def _at(value: Any, path: list[str]) -> Iterator[Any]:
         yield from _at(one, path[1:])
 
 
-def _objects(document: Any, way: list[str]) -> Iterator[dict[str, Any]]:
+def _objects(document: Any, path: list[str]) -> Iterator[dict[str, Any]]:
     """All objects at a place."""
-    return (one for one in _at(document, way) if isinstance(one, dict))
+    return (one for one in _at(document, path) if isinstance(one, dict))
 
 
 def _names(document: dict[str, Any]) -> list[str]:
@@ -84,9 +84,9 @@ _RENAMED: Mapping[str, Mapping[str, str]] = {
         "claims/*/differences/*/against": "participants_against",
     },
 }
-#: By kind and place: fields of version 1 that stand in an object beside them since.
+#: By artefact and place: fields of version 1 that stand in an object beside them since.
 _MOVED: Mapping[str, Mapping[str, Mapping[str, str]]] = {"study": {"demonstrations/*": {"onset_m": "metrics"}}}
-#: By kind and place: fields that version 1 does not have, and what they would be.
+#: By artefact and place: fields that version 1 lacks, and functions that give their values.
 _ADDED: Mapping[str, Mapping[str, Mapping[str, Callable[[Any], Any]]]] = {
     "metrics": {
         "": {
@@ -114,8 +114,8 @@ _ADDED: Mapping[str, Mapping[str, Mapping[str, Callable[[Any], Any]]]] = {
 
 def _rename(document: dict[str, Any], place: list[str], name: str) -> None:
     """Give a field another name."""
-    *way, old = place
-    for parent in _objects(document, way):
+    *path, old = place
+    for parent in _objects(document, path):
         if old in parent and name not in parent:
             parent[name] = parent.pop(old)
 
@@ -138,14 +138,14 @@ def upgraded(document: dict[str, Any], artefact: str) -> dict[str, Any]:
     """
     if document["version"] == VERSION:
         return document
-    for place, name in _RENAMED.get(kind, {}).items():
+    for place, name in _RENAMED.get(artefact, {}).items():
         _rename(document, place.split("/"), name)
-    for place, moved in _MOVED.get(kind, {}).items():
+    for place, moved in _MOVED.get(artefact, {}).items():
         for parent in _objects(document, place.split("/")):
             for name in moved.keys() & parent.keys():
                 if isinstance(target := parent.get(moved[name]), dict):
                     target[name] = parent.pop(name)
-    for place, fields in _ADDED.get(kind, {}).items():
+    for place, fields in _ADDED.get(artefact, {}).items():
         for parent in _objects(document, place.split("/") if place else []):
             parent |= {name: value(parent) for name, value in fields.items() if name not in parent}
     document["version"] = VERSION

@@ -15,13 +15,13 @@ from navirl_cli.logs.messages.reader import Progress
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import map_in_order
 
-#: The hashes of a recording's files, and what came out of it.
+#: The hashes of a recording's files, and its demonstrations.
 _Result = tuple[tuple[Input, ...], Extraction]
 
 
 @dataclass(frozen=True)
 class Recordings:
-    """What came out of several recordings."""
+    """The demonstrations of several recordings."""
 
     #: Of the recordings that gave demonstrations, in the order of the arguments.
     extractions: tuple[Extraction, ...]
@@ -35,7 +35,7 @@ class Recordings:
         return numbered(self.extractions)
 
     def notes(self, demonstrations: Iterable[Demonstration]) -> list[str]:
-        """What is odd about recordings and about their demonstrations, as ``name: text``."""
+        """What is unusual about recordings and about their demonstrations, as ``name: text``."""
         notes = [note for one in self.extractions for note in one.notes]
         return [*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]
 
@@ -65,7 +65,7 @@ def extract_recordings(
         progress: Called with bytes done and bytes in all.
 
     Returns:
-        What came out of them.
+        Their demonstrations, and the recordings that gave none.
 
     Raises:
         NavirlError: No recording gave a demonstration.

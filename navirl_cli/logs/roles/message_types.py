@@ -9,7 +9,7 @@ role, and how the topics that serve are recognised. No other file knows the type
   robot's own frame, and ``vx``, ``vy``, the velocity forward and to the left in m/s;
 - map: ``resolution``, ``width``, ``height``, the origin ``px``, ``py``, ``qz``, ``qw``, and ``data``, the cells;
 - people: ``px``, ``py``, ``pz`` in m, one person for each entry; where the type has them ``name`` and ``space``, which
-  together tell people apart;
+  together identify people;
 - goal: ``px``, ``py``, ``pz`` in m; of a sequence the last entry is the goal;
 - joystick: any other field is a command that is 0 at rest; a sequence ``axes`` may rest elsewhere.
 """
