@@ -7,9 +7,8 @@ import pytest
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import scan
-from navirl_cli.logs.roles.topics import ROLES, Topic, choose, refusal, short_name, topics_of
 from navirl_cli.logs.roles.message_types import WRENCHES
-from navirl_cli.logs.roles.topics import Topic, choose, refusal, short_name, topics_of
+from navirl_cli.logs.roles.topics import ROLES, Topic, choose, refusal, short_name, topics_of
 
 GRID = "nav_msgs/msg/OccupancyGrid"
 POSE = "geometry_msgs/msg/PoseStamped"
