@@ -9,6 +9,7 @@ import click
 
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.commands import completion
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -72,6 +73,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         "--metrics",
         default=PAPER_METRICS,
         type=Metrics(),
+        shell_complete=completion.metrics,
         help="Comma-separated names of metrics, or all.  [default: length_m,min_distance_m,area_m2]",
     ),
     click.option(
@@ -112,6 +114,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         multiple=True,
         nargs=2,
         metavar="GROUP OTHER",
+        shell_complete=completion.groups,
         help="Compare the driven paths of two groups by participant; repeatable.",
     ),
     click.option(

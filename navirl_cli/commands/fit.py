@@ -7,6 +7,7 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands import completion
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -71,6 +72,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
         "initial",
         default="",
         metavar="FILE|NAME=VALUE,...",
+        shell_complete=completion.initial,
         help="Initial values: a reward file, or parameters as c0=-50,a_g=-0.01,a_p=-5,sigma_p=2.",
     ),
     click.option(
@@ -114,6 +116,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
         "profiles",
         multiple=True,
         metavar="NAME",
+        shell_complete=completion.parameters,
         help="Profile likelihood of this parameter with its 95 % interval, e.g. sigma_p; repeatable.",
     ),
     click.option(

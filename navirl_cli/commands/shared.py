@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.commands import completion
 from navirl_cli.commands.types import Count, FilePath, OutputPath, RoleTopic
 from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
@@ -32,6 +33,7 @@ topic_option = click.option(
     metavar="ROLE=/TOPIC",
     multiple=True,
     type=RoleTopic(),
+    shell_complete=completion.topics,
     help="Topic of a role, where several topics fit, e.g. wrench=/ft; repeatable.",
 )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from navirl_cli.commands import completion
 from navirl_cli.commands.shared import force_option, output_option
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
@@ -100,7 +101,9 @@ def page_options(function: Function) -> Function:
 
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
-trial_option = click.option("--trial", help="Trial to draw, e.g. p01/3.  [default: the first]")
+trial_option = click.option(
+    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first]"
+)
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
 
 
