@@ -1,5 +1,6 @@
 """The command line: commands are imported when called, and expected errors become messages here and only here."""
 
+import os
 import sys
 from typing import Any
 
@@ -64,4 +65,8 @@ def cli(debug: bool) -> None:
 
 def main() -> None:
     """Entry point of the command ``navirl``."""
+    if "_NAVIRL_COMPLETE" in os.environ:
+        from navirl_cli.commands.completion import use_whole_words
+
+        use_whole_words()
     sys.exit(cli(prog_name="navirl"))

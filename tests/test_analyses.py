@@ -6,7 +6,7 @@ import pytest
 from navirl_cli.errors import ArgumentError, DemonstrationError, RewardError
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import evidence_of
-from navirl_cli.irl.fit import fit
+from navirl_cli.irl.fit import PAPER_L2, fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
 
@@ -20,27 +20,34 @@ def evidence():
 
 
 @pytest.mark.parametrize(
-    ("questions", "prior", "steps", "message"),
+    ("questions", "changes", "message"),
     [
-        (Questions(cross_validate=True), True, Steps.ALL, "`cross_validate` and `prior` exclude each other"),
-        (Questions(correct_bias=True), True, Steps.ALL, "`correct_bias` needs all steps and no prior"),
-        (Questions(correct_bias=True), False, Steps.CONTACT, "`correct_bias` needs all steps and no prior"),
-        (Questions(correct_bias=True, bootstrap=2), False, Steps.ALL, "leave out `prior`, `steps`, `bootstrap`"),
+        (Questions(cross_validate=True), {"prior": True}, "`cross_validate` and `prior` exclude each other"),
+        (Questions(correct_bias=True), {"prior": True}, "`correct_bias` needs all steps and no prior"),
+        (Questions(correct_bias=True), {"steps": Steps.CONTACT}, "`correct_bias` needs all steps and no prior"),
+        (Questions(correct_bias=True, bootstrap=2), {}, "leave out `prior`, `steps`, `bootstrap`"),
+        (
+            Questions(correct_bias=True),
+            {"l2": 0.5},
+            "maximum likelihood: expected `l2` <= 0.001, found 0.5",
+        ),
     ],
 )
-def test_questions_that_exclude_each_other_are_refused_before_the_fit(evidence, questions, prior, steps, message):
+def test_questions_that_exclude_each_other_are_refused_before_anything_is_read(questions, changes, message):
+    arguments = {"steps": Steps.ALL, "prior": False, "l2": PAPER_L2}
+    Questions(correct_bias=True).check_arguments(**arguments)
     with pytest.raises(ArgumentError, match=message):
-        questions.check(evidence, TRUTH, steps, prior=prior)
+        questions.check_arguments(**arguments | changes)
 
 
 def test_questions_that_the_data_cannot_answer_are_refused_before_the_fit(evidence):
-    Questions(bootstrap=2, profiles=("c0",), cross_validate=True).check(evidence, TRUTH, Steps.ALL, prior=False)
+    Questions(bootstrap=2, profiles=("c0",), cross_validate=True).check(evidence, TRUTH)
     with pytest.raises(RewardError, match="expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'"):
-        Questions(profiles=("c1",)).check(evidence, TRUTH, Steps.ALL, prior=False)
+        Questions(profiles=("c1",)).check(evidence, TRUTH)
     alone = evidence_of(make.drawn(SCENE, TRUTH, 4, seed=1))
     for questions in (Questions(bootstrap=2), Questions(cross_validate=True)):
         with pytest.raises(DemonstrationError, match="expected several participants"):
-            questions.check(alone, TRUTH, Steps.ALL, prior=False)
+            questions.check(alone, TRUTH)
 
 
 def test_a_question_without_an_answer_leaves_the_fit_and_the_other_answers(evidence, monkeypatch):

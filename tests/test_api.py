@@ -195,7 +195,7 @@ class TestFrames:
         assert len(found.to_frame("demonstrations")) == len(demos)
         assert list(found.to_frame("pairs")["metric"]) == ["length_m", "min_distance_m", "area_m2"]
         assert found.to_frame("ranks")["rank"].between(0, 1).all()
-        with pytest.raises(navirl.NavirlError, match="expected one of groups, demonstrations, pairs, ranks"):
+        with pytest.raises(navirl.NavirlError, match="expected one of 'groups', 'demonstrations', 'pairs', 'ranks'"):
             found.to_frame("rank")
 
     def test_without_pandas_the_error_says_how_to_get_it(self, monkeypatch):
@@ -244,24 +244,36 @@ class TestErrors:
         [
             (lambda _d, _r: navirl.extract(), "`logs`: expected at least one log"),
             (lambda _d, _r: navirl.extract("none.mcap"), r"none\.mcap"),
-            (lambda _d, _r: navirl.extract(LOGS[0], split="goals"), "`split`: expected goal or stop or none"),
+            (
+                lambda _d, _r: navirl.extract(LOGS[0], split="goals"),
+                "`split`: expected one of 'goal', 'stop', 'none', found 'goals'",
+            ),
             (lambda _d, _r: navirl.extract(LOGS[0], resolution=0), "`resolution`: expected a number from 0.01 to 2"),
             (lambda _d, _r: navirl.extract(LOGS[0], contact_force=0), "`contact_force`: expected a number above 0"),
             (lambda _d, _r: navirl.extract(LOGS[0], person=(1, 2, 3)), r"expected points as \(x, y\) in m"),
             (lambda _d, _r: navirl.extract(LOGS[0], no_wrench=True, gain=True), "`no_wrench` excludes"),
             (lambda _d, _r: navirl.inspect(), "`logs`: expected at least one log"),
-            (lambda d, _r: navirl.fit(d, condition="push"), "`condition`: expected force or joystick or autonomous"),
-            (lambda d, _r: navirl.fit(d, cross_validate="trial"), "`cross_validate`: expected participant"),
+            (
+                lambda d, _r: navirl.fit(d, condition="push"),
+                "`condition`: expected one of 'force', 'joystick', 'autonomous'",
+            ),
+            (lambda d, _r: navirl.fit(d, cross_validate="trial"), "`cross_validate`: expected 'participant'"),
             (lambda d, _r: navirl.fit(d, correct_bias=True, bootstrap=5), "`correct_bias` needs all steps"),
             (lambda d, _r: navirl.fit(d, l2=-1), "`l2`: expected a number from 0"),
             (lambda _d, _r: navirl.fit([]), "`demos`: expected at least one demonstration"),
-            (lambda d, r: navirl.evaluate(d, r, metrics="length"), "`metrics`: expected length_m or"),
+            (lambda d, r: navirl.evaluate(d, r, metrics="length"), "`metrics`: expected one of 'length_m', "),
             (lambda d, _r: navirl.evaluate(d, ranks=True), "`ranks` needs one `reward`"),
             (lambda d, r: navirl.evaluate(d, r, pair="force"), "`pair`: expected two names of groups"),
             (lambda d, _r: navirl.policy({"c1": 0.0}, d[0]), "c1"),
-            (lambda _d, r: r["c1"], "expected a parameter of c0, a_g, a_p, sigma_p, found 'c1'"),
-            (lambda d, r: navirl.plot.policy(r, d[0], overlay="paths"), "`overlay`: expected demos or samples"),
-            (lambda d, r: navirl.plot.policy(r, d[0], style="grey"), "`style`: expected paper or screen or dark"),
+            (lambda _d, r: r["c1"], "parameter: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'"),
+            (
+                lambda d, r: navirl.plot.policy(r, d[0], overlay="paths"),
+                "`overlay`: expected one of 'demos', 'samples'",
+            ),
+            (
+                lambda d, r: navirl.plot.policy(r, d[0], style="grey"),
+                "`style`: expected one of 'paper', 'screen', 'dark'",
+            ),
             (lambda _d, r: navirl.plot.profile(r, "c0"), r"profile was followed \(sigma_p\), found 'c0'"),
         ],
     )

@@ -138,7 +138,7 @@ def test_wrong_outputs_are_refused_before_any_work(navirl, files, tmp_path):
 
 def test_the_options_offer_all_styles_and_formats():
     assert list(STYLES) == list(LOOKS)
-    assert list(FORMATS) == list(sheet.METADATA)
+    assert list(FORMATS) == [f".{extension}" for extension in sheet.METADATA]
 
 
 @pytest.mark.parametrize(("kind", "label"), [("value", "soft value [nats]"), ("actions", "most likely move")])

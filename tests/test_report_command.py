@@ -84,7 +84,6 @@ def test_it_opens_sorts_enlarges_and_prints(work):
 
 def test_refusals(navirl, work):
     words = ("report", work / "demos.json", work / "reward.json")
-    assert "expected a name that ends in .html, found '.pdf'" in navirl(*words, "-o", "page.pdf", code=1).stderr
     assert "exists already" in navirl(*words, "-o", work / "page.html", code=1).stderr
     swapped = navirl("report", work / "reward.json", work / "demos.json", "-o", "x.html", code=1).stderr
     assert "expected navirl demonstrations" in swapped

@@ -7,7 +7,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from navirl_cli.errors import ArgumentError
+from navirl_cli.errors import ArgumentError, unknown
 
 Point: TypeAlias = tuple[float, float]
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -25,7 +25,7 @@ def one_of(names: Sequence[str], value: str, argument: str) -> str:
         ArgumentError: It is none of them.
     """
     if value not in names:
-        raise ArgumentError(f"`{argument}`: expected {' or '.join(names)}, found {value!r}")
+        raise ArgumentError(unknown(f"`{argument}`", value, names))
     return value
 
 
@@ -74,5 +74,7 @@ def pairs_in(pair: tuple[str, str] | Sequence[tuple[str, str]]) -> list[tuple[st
     for one in several:
         if isinstance(one, str) or len(one) != 2:
             raise ArgumentError(f"`pair`: expected two names of groups, found {one!r}")
+        if one[0] == one[1]:
+            raise ArgumentError(f"`pair`: expected two groups, found {one[0]!r} twice")
         found.append((str(one[0]), str(one[1])))
     return found

@@ -37,7 +37,7 @@ from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.evaluation.groups import FIELDS
+from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
@@ -253,14 +253,6 @@ def fit(
         >>> reward["c0"]  # per metre
         -49.02...
     """
-    demos = demonstrations_in(demos)
-    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
-    which = chosen(Steps, steps, "steps")
-    selected = select(demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=which)
-    earlier = None if prior is None else learnt_in(prior)
-    if earlier is not None:
-        check_cells(earlier, selected.demonstrations, "prior")
-    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
     questions = Questions(
         correct_bias,
         None if bootstrap is None else int(within("bootstrap", bootstrap, 2, 100_000)),
@@ -268,11 +260,20 @@ def fit(
         cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
         seed,
     )
-    questions.check(selected.evidence, start, which, prior=earlier is not None)
+    which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
+    questions.check_arguments(which, prior=prior is not None, l2=weight)
+    demos = demonstrations_in(demos)
+    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    selected = select(demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=which)
+    earlier = None if prior is None else learnt_in(prior)
+    if earlier is not None:
+        check_cells(earlier, selected.demonstrations, "prior")
+    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
+    questions.check(selected.evidence, start)
     found = fit_reward(
         selected.evidence,
         start,
-        within("l2", l2, 0, 1e6),
+        weight,
         prior=None if earlier is None else earlier.as_prior(),
         method=chosen(Method, method, "method"),
     )
@@ -332,10 +333,12 @@ def evaluate(
         int(within("samples", samples, 2, MOST)),
         None if precision is None else within("precision", precision, 1e-3, 1),
     )
+    asked = pairs_in(pair)
+    groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
     result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
-    compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in pairs_in(pair)]
+    compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in asked]
     ranked = ranks_of(demos, next(iter(learnt.values())), drawing.samples, rng) if ranks else []
     inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
     document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)

@@ -16,19 +16,19 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
 from navirl_cli.documents.tables import ENDINGS, Format
 from navirl_cli.documents.text import to_text
-from navirl_cli.errors import ArgumentError, MissingPackageError
+from navirl_cli.errors import ArgumentError, MissingPackageError, unknown
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.metrics import Metric
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Rank
-from navirl_cli.files import Input, check_writable, replacing
+from navirl_cli.files import Input, check_writable
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
-from navirl_cli.reports.evaluation import evaluation_text
+from navirl_cli.reports.evaluation import evaluation_text, write_evaluation
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import report
 
@@ -166,7 +166,7 @@ class FittedReward(LearntReward):
             parameter.name: value for parameter, value in zip(self.reward.parameters, self.reward.theta, strict=True)
         }
         if name not in values:
-            raise ArgumentError(f"expected a parameter of {', '.join(values)}, found {name!r}")
+            raise ArgumentError(unknown("parameter", name, values))
         return values[name]
 
     def __repr__(self) -> str:
@@ -324,7 +324,7 @@ class Evaluation:
             NavirlError: pandas is not installed, or there is no such table.
         """
         if table not in TABLES:
-            raise ArgumentError(f"`table`: expected one of {', '.join(TABLES)}, found {table!r}")
+            raise ArgumentError(unknown("`table`", table, TABLES))
         rows: Any = self.document[table] or []
         if table == "ranks":
             rows = rows["demonstrations"] if rows else []
@@ -347,11 +347,7 @@ class Evaluation:
             NavirlError: The ending is unknown, or the file cannot be written.
         """
         output = Path(path)
-        if output.suffix not in ENDINGS:
+        if output.suffix.lower() not in ENDINGS:
             raise ArgumentError(f"{output}: expected a name that ends in {', '.join(ENDINGS)}, found {output.suffix!r}")
         check_writable(output, force=force)
-        if ENDINGS[output.suffix] is Format.JSON:
-            write_json(output, "metrics", self.document, force=force)
-            return
-        with replacing(output, force=force) as temporary:
-            temporary.write_text(self._written(ENDINGS[output.suffix]) + "\n", encoding="utf-8", newline="")
+        write_evaluation(output, self.document, self._written, force=force)

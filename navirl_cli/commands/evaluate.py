@@ -1,6 +1,7 @@
 """``navirl evaluate``: what demonstrated, learnt and baseline paths are like, and how groups of them differ."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,10 @@ import click
 
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands import completion
 from navirl_cli.commands.shared import (
+    check_output,
     demonstrations_in,
-    demos_argument,
     echo,
     echo_json,
     finish,
@@ -24,18 +25,16 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.types import Choice, FilePath, Number
 from navirl_cli.commands.usage import Command, Example, section
-from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import ENDINGS, Format, written
-from navirl_cli.errors import ArtefactError, DemonstrationError, unknown
+from navirl_cli.errors import unknown
 from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import FIELDS
+from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
-from navirl_cli.files import Input, check_writable, replacing
-from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.evaluation import evaluation_text, metrics_table
+from navirl_cli.files import Input
+from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
 
 
 class Metrics(click.ParamType):  # type: ignore[type-arg]
@@ -56,13 +55,6 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         return tuple(BY_NAME[name] for name in dict.fromkeys(names))
 
 
-def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
-    """Print all metrics and end."""
-    if value:
-        click.echo(written(metrics_table()))
-        ctx.exit()
-
-
 @click.command(
     cls=Command,
     examples=[
@@ -74,22 +66,18 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
         Example("A table for a paper", "navirl evaluate demos.json --reward reward.json --samples 100 -o metrics.tex"),
     ],
 )
-@demos_argument
+@click.argument("demos", metavar="DEMOS", required=False, type=FilePath)
 @section(
     "Metrics",
     click.option(
         "--metrics",
         default=PAPER_METRICS,
         type=Metrics(),
+        shell_complete=completion.metrics,
         help="Comma-separated names of metrics, or all.  [default: length_m,min_distance_m,area_m2]",
     ),
     click.option(
-        "--list-metrics",
-        is_flag=True,
-        is_eager=True,
-        expose_value=False,
-        callback=_list_metrics,
-        help="List all metrics with unit, definition and source, and exit.",
+        "--list-metrics", is_flag=True, help="List all metrics with unit, definition and source; DEMOS is not needed."
     ),
     click.option(
         "--by",
@@ -111,6 +99,7 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
     samples_option(),
     click.option(
         "--precision",
+        "error",
         type=Number(1e-3, 1),
         help="Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard "
         "deviation.",
@@ -125,6 +114,7 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
         multiple=True,
         nargs=2,
         metavar="GROUP OTHER",
+        shell_complete=completion.groups,
         help="Compare the driven paths of two groups by participant; repeatable.",
     ),
     click.option(
@@ -136,24 +126,25 @@ def _list_metrics(ctx: click.Context, _param: click.Parameter, value: bool) -> N
     click.option(
         "--format",
         "style",
-        type=Choice([how.value for how in Format]),
+        type=Choice([how.value for how in Format if how is not Format.JSON]),
         default=Format.TEXT.value,
         show_default=True,
         help="Format of the printed tables.",
     ),
-    output_option("File to write as well: .json, .csv, .md or .tex.", required=False),
+    output_option("File to write as well: .json, .csv, .md or .tex.", *ENDINGS, required=False),
     json_option,
     force_option,
 )
 def evaluate(
-    demos: Path,
+    demos: Path | None,
     rewards: tuple[Path, ...],
     metrics: tuple[Metric, ...],
+    list_metrics: bool,
     fields: tuple[str, ...],
     pairs: tuple[tuple[str, str], ...],
     ranks: bool,
     samples: int,
-    precision: float | None,
+    error: float | None,
     seed: int,
     style: str,
     as_json: bool,
@@ -168,18 +159,23 @@ def evaluate(
     """
     import numpy as np
 
-    if ranks and len(rewards) != 1:
-        raise click.UsageError("--ranks needs one --reward.")
+    if list_metrics:
+        _list_metrics(Format(style), as_json=as_json)
+        return
+    if demos is None:
+        raise click.UsageError("Missing argument 'DEMOS'.")
+    _check_arguments(rewards, pairs, ranks=ranks)
     if output is not None:
-        _check_output(output, force=force)
+        check_output(output, [demos, *rewards], force=force)
     demonstrations = demonstrations_in(demos)
-    learnt = _rewards(rewards, demonstrations)
-    rng = np.random.default_rng(seed)
+    groups_named(demonstrations, [name for pair in pairs for name in pair], fields, "pair")  # refuses unknown ones
+    learnt = {path.stem: read_reward_for(path, demonstrations).reward for path in rewards}
+    rng, precision = np.random.default_rng(seed), Precision(samples, error)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
             demonstrations,
             learnt,
-            Precision(samples, precision),
+            precision,
             rng,
             metrics=metrics,
             fields=fields,
@@ -188,42 +184,32 @@ def evaluate(
     compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
     ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
     inputs = [Input.of(path) for path in (demos, *rewards)]
-    content = metrics_document(result, compared, ranked, metrics, inputs, Precision(samples, precision), seed)
+    document = metrics_document(result, compared, ranked, metrics, inputs, precision, seed)
+    text = partial(evaluation_text, result, compared, ranked, metrics)
     if output is not None:
-        _write(output, content, evaluation_text(result, compared, ranked, metrics, ENDINGS[output.suffix]), force=force)
-    if as_json or style == Format.JSON:
-        echo_json(content)
+        write_evaluation(output, document, text, force=force)
+    if as_json:
+        echo_json(document)
     else:
-        echo(evaluation_text(result, compared, ranked, metrics, Format(style)))
+        echo(text(Format(style)))
     finish(result.notes)
 
 
-def _rewards(paths: Sequence[Path], demonstrations: list[Demonstration]) -> dict[str, Reward]:
-    """Learnt rewards by the names of their files.
-
-    Raises:
-        DemonstrationError: Two files have one name.
-    """
-    learnt: dict[str, Reward] = {}
-    for path in paths:
-        if path.stem in learnt:
-            raise DemonstrationError(f"{path}: another --reward is called {path.stem!r} too; rename one of the files")
-        learnt[path.stem] = read_reward_for(path, demonstrations).reward
-    return learnt
+def _list_metrics(how: Format, *, as_json: bool) -> None:
+    """Print all metrics."""
+    if as_json:
+        echo_json(metrics_table().records())
+    else:
+        click.echo(written(metrics_table(), how))
 
 
-def _check_output(output: Path, *, force: bool) -> None:
-    """Refuse early what cannot be written."""
-    if output.suffix not in ENDINGS:
-        known = ", ".join(ENDINGS)
-        raise ArtefactError(f"{output}: expected a name that ends in one of {known}, found {output.suffix!r}")
-    check_writable(output, force=force)
-
-
-def _write(output: Path, content: dict[str, Any], text: str, *, force: bool) -> None:
-    """The results in the format of the file's ending."""
-    if ENDINGS[output.suffix] is Format.JSON:
-        write_json(output, "metrics", content, force=force)
-        return
-    with replacing(output, force=force) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8", newline="")
+def _check_arguments(rewards: Sequence[Path], pairs: Sequence[tuple[str, str]], *, ranks: bool) -> None:
+    """Refuse what cannot be right whatever the files hold."""
+    if ranks and len(rewards) != 1:
+        raise click.UsageError("--ranks needs one --reward.")
+    stems = [path.stem for path in rewards]
+    if twice := [stem for stem in stems if stems.count(stem) > 1]:
+        raise click.UsageError(f"--reward: expected files of different names, found several {twice[0]}; rename one.")
+    for one, other in pairs:
+        if one == other:
+            raise click.UsageError(f"--pair: expected two groups, found {one!r} twice.")

@@ -10,6 +10,7 @@ from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_do
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import (
     bytes_bar,
+    check_output,
     echo,
     echo_json,
     finish,
@@ -31,7 +32,7 @@ from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.tables import Table
 from navirl_cli.documents.text import to_text
-from navirl_cli.files import Input, check_writable
+from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.roles.clocks import TimeSource
@@ -156,9 +157,10 @@ def extract(
     force does not depend on where the sensor is mounted; a torque does, by the lever arm. A push on the robot's body
     that does not pass through the sensor is not measured.
     """
-    if no_wrench and (gain or wrench_frame):
-        raise click.UsageError("--no-wrench leaves nothing to --gain and --wrench-frame.")
-    check_writable(output, force=force)
+    chosen = topics_by_role(topics)
+    if no_wrench and (gain or wrench_frame or "wrench" in chosen):
+        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame and --topic wrench=/NAME.")
+    check_output(output, [*logs, *([] if map_file is None else [map_file])], force=force)
     settings = ExtractSettings(
         split=Split(split),
         resolution_m=resolution,
@@ -171,7 +173,7 @@ def extract(
         gain=gain,
     )
     options = LoadOptions(
-        topics=topics_by_role(topics),
+        topics=chosen,
         time=TimeSource(time_source),
         frame=frame,
         wrench_frame=wrench_frame,

@@ -7,7 +7,9 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands import completion
 from navirl_cli.commands.shared import (
+    check_output,
     demonstrations_in,
     demos_argument,
     echo,
@@ -25,7 +27,7 @@ from navirl_cli.commands.usage import Command, Example, as_options, section
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
-from navirl_cli.files import Input, check_writable
+from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit, Method
@@ -70,6 +72,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
         "initial",
         default="",
         metavar="FILE|NAME=VALUE,...",
+        shell_complete=completion.initial,
         help="Initial values: a reward file, or parameters as c0=-50,a_g=-0.01,a_p=-5,sigma_p=2.",
     ),
     click.option(
@@ -113,6 +116,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
         "profiles",
         multiple=True,
         metavar="NAME",
+        shell_complete=completion.parameters,
         help="Profile likelihood of this parameter with its 95 % interval, e.g. sigma_p; repeatable.",
     ),
     click.option(
@@ -148,17 +152,10 @@ def fit(
     derivatives; a trust-region Newton method from two starts gives the maximum; the observed information gives
     standard errors.
     """
-    check_writable(output, force=force)
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)
+    questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
-    if output.resolve() in {file.resolve() for file in files}:
-        raise click.UsageError(f"{output}: would replace what is read; name another output")
-    if cross_validate and prior_file:
-        raise click.UsageError("--cross-validate and --prior exclude each other: the prior may know who is left out")
-    if correct_bias and (prior_file or steps != "all" or bootstrap or profiles or cross_validate):
-        raise click.UsageError(
-            "--correct-bias is for whole paths without --prior, and other questions are asked of the fit itself: "
-            "leave out --prior, --steps, --bootstrap, --profile and --cross-validate"
-        )
+    check_output(output, files, force=force)
     start = _start(initial)
     selected = select(
         demonstrations_in(demos),
@@ -171,8 +168,7 @@ def fit(
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
     if earlier is not None and not initial:
         start = earlier.reward
-    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)
-    questions.check(evidence, start, Steps(steps), prior=earlier is not None)
+    questions.check(evidence, start)
     found, analyses, lost = answers(
         evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
     )

@@ -8,6 +8,7 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.shared import (
+    check_output,
     demonstrations_in,
     demos_argument,
     finish,
@@ -19,9 +20,8 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
-from navirl_cli.errors import ArtefactError
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.files import Input, check_writable, replacing
+from navirl_cli.files import Input, replacing
 
 
 @click.command(
@@ -34,7 +34,7 @@ from navirl_cli.files import Input, check_writable, replacing
 @demos_argument
 @click.argument("reward", type=FilePath)
 @section("Learnt paths", samples_option(), seed_option)
-@section("Output", output_option("Page to write: .html."), force_option)
+@section("Output", output_option("Page to write: .html.", ".html"), force_option)
 def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
@@ -52,9 +52,7 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     from navirl_cli.irl.solved import solved
     from navirl_cli.reports.reward import METRICS, report_of
 
-    if output.suffix != ".html":
-        raise ArtefactError(f"{output}: expected a name that ends in .html, found {output.suffix!r}")
-    check_writable(output, force=force)
+    check_output(output, [demos, reward], force=force)
     demonstrations = demonstrations_in(demos)
     learnt = read_reward_for(reward, demonstrations)
     rng = np.random.default_rng(seed)

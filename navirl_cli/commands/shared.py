@@ -10,10 +10,12 @@ from typing import Any
 import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
-from navirl_cli.commands.types import Count, FilePath, RoleTopic
+from navirl_cli.commands import completion
+from navirl_cli.commands.types import Count, FilePath, OutputPath, RoleTopic
 from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.files import check_writable
 
 #: As :data:`navirl_cli.evaluation.drawn.MOST`, which is not imported before paths are sampled.
 MOST_SAMPLES = 100_000
@@ -31,6 +33,7 @@ topic_option = click.option(
     metavar="ROLE=/TOPIC",
     multiple=True,
     type=RoleTopic(),
+    shell_complete=completion.topics,
     help="Topic of a role, where several topics fit, e.g. wrench=/ft; repeatable.",
 )
 
@@ -67,9 +70,23 @@ def demonstrations_in(path: Path) -> list[Demonstration]:
     return demonstrations
 
 
-def output_option(what: str, *, required: bool = True) -> Callable[[Function], Function]:
-    """``-o/--output`` with its help."""
-    return click.option("-o", "--output", type=FilePath, required=required, help=what)
+def output_option(what: str, *endings: str, required: bool = True) -> Callable[[Function], Function]:
+    """``-o/--output`` with its help, and the endings that its name may have."""
+    kind = OutputPath(endings) if endings else FilePath
+    return click.option("-o", "--output", type=kind, required=required, help=what)
+
+
+def check_output(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
+    """Refuse before any work a file that cannot be written, or that would replace what is read.
+
+    Raises:
+        UsageError: It is one of the inputs.
+        ArtefactError: It cannot be written.
+    """
+    for path in inputs:
+        if output.resolve() == path.resolve():
+            raise click.UsageError(f"{output}: expected another file than the input {path}; choose another --output.")
+    check_writable(output, force=force)
 
 
 def echo_json(document: Any) -> None:

@@ -7,6 +7,8 @@ from weakref import WeakKeyDictionary
 
 import click
 
+from navirl_cli.errors import ArgumentError
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 #: Sections that end every help.
 _LAST = ("Output", "Help")
@@ -59,7 +61,17 @@ class WithExamples(click.Command):
 
 
 class Command(WithExamples):
-    """A command whose help shows options in sections, as :func:`section` puts them."""
+    """A command whose help shows options in sections, as :func:`section` puts them.
+
+    An :class:`~navirl_cli.errors.ArgumentError` is an error of usage, since its words cannot be right.
+    """
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except ArgumentError as error:
+            raise click.UsageError(as_options(str(error)), ctx) from error
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each section."""

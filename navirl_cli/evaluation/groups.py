@@ -79,17 +79,28 @@ def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = 
     return groups
 
 
-def groups_named(demonstrations: Iterable[Demonstration], names: Iterable[str]) -> list[list[Demonstration]]:
+def groups_named(
+    demonstrations: Iterable[Demonstration],
+    names: Iterable[str],
+    fields: Collection[str] = (),
+    argument: str = "group",
+) -> list[list[Demonstration]]:
     """The demonstrations of each of several groups.
+
+    Args:
+        demonstrations: Of all groups.
+        names: Of groups.
+        fields: By what they are grouped, as in :func:`by_group`.
+        argument: That names the groups, for messages.
 
     Raises:
         DemonstrationError: A group does not exist.
     """
-    known = by_group(demonstrations)
+    known = by_group(demonstrations, fields)
     found = []
     for name in names:
         if name not in known:
-            raise DemonstrationError(unknown("`group`", name, known))
+            raise DemonstrationError(unknown(f"`{argument}`", name, known))
         found.append(known[name])
     return found
 

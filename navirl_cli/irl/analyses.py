@@ -9,7 +9,7 @@ from navirl_cli.errors import ArgumentError, NavirlError
 from navirl_cli.irl.bias import corrected
 from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.profile import Profile, number_of, profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
@@ -36,13 +36,11 @@ class Questions:
     #: Of the bootstrap's draws.
     seed: int = 0
 
-    def check(self, evidence: Evidence, start: Reward, steps: Steps, *, prior: bool) -> None:
-        """Refuse before a fit what would be refused after it.
+    def check_arguments(self, steps: Steps, *, prior: bool, l2: float) -> None:
+        """Refuse before anything is read what cannot be asked of any data.
 
         Raises:
-            ArgumentError: The questions exclude each other, the prior or the steps.
-            RewardError: A parameter is unknown.
-            DemonstrationError: Several participants are needed.
+            ArgumentError: The questions exclude each other, the prior, the steps or the regulariser.
         """
         if self.cross_validate and prior:
             raise ArgumentError(
@@ -55,6 +53,18 @@ class Questions:
                 "`correct_bias` needs all steps and no prior, and the other analyses belong to the uncorrected fit: "
                 "leave out `prior`, `steps`, `bootstrap`, `profile` and `cross_validate`"
             )
+        if self.correct_bias and l2 > PAPER_L2:
+            raise ArgumentError(
+                f"`correct_bias` corrects maximum likelihood: expected `l2` <= {PAPER_L2:g}, found {l2:g}"
+            )
+
+    def check(self, evidence: Evidence, start: Reward) -> None:
+        """Refuse before a fit what these data cannot answer after it.
+
+        Raises:
+            RewardError: A parameter is unknown.
+            DemonstrationError: Several participants are needed.
+        """
         for name in self.profiles:
             number_of(start, name)
         for name, asked in (("bootstrap", self.bootstrap), ("cross_validate", self.cross_validate)):

@@ -1,18 +1,21 @@
 """What ``navirl evaluate`` prints."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from navirl_cli.artefacts.metrics import Pairs
-from navirl_cli.documents.tables import Cell, Column, Format, Interval, Spread, Table, written
+from navirl_cli.artefacts.store import write_json
+from navirl_cli.documents.tables import ENDINGS, Cell, Column, Format, Interval, Spread, Table, written
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric
 from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.files import replacing
 
 #: More metrics are written below each other.
 MOST_COLUMNS = 6
@@ -53,6 +56,28 @@ def evaluation_text(
     missing = "\n".join(f"Left out: {', '.join(labels)}: {reason}." for reason, labels in left_out.items())
     legend = "\n".join(_legend(result, metrics)) if how is Format.TEXT else ""
     return "\n\n".join(filter(None, [*parts, missing, legend]))
+
+
+def write_evaluation(
+    path: Path, document: Mapping[str, Any], text: Callable[[Format], str], *, force: bool = False
+) -> None:
+    """Write results in the format of a file's ending.
+
+    Args:
+        path: The file, with one of ENDINGS.
+        document: The content of a metrics file.
+        text: Everything in another format.
+        force: Replace an existing file.
+
+    Raises:
+        ArtefactError: The file cannot be written.
+    """
+    how = ENDINGS[path.suffix.lower()]
+    if how is Format.JSON:
+        write_json(path, "metrics", document, force=force)
+        return
+    with replacing(path, force=force) as temporary:
+        temporary.write_text(text(how) + "\n", encoding="utf-8", newline="")
 
 
 def group_table(groups: Sequence[GroupMetrics], metrics: Sequence[Metric], caption: str = "") -> Table:

@@ -1,21 +1,31 @@
 """Figures that compare: rewards, groups of demonstrations, and demonstrations with the policy's own paths."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.commands import completion
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
 from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, seed_option
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, Function, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
 
-_GROUP = "A group as in the tables of navirl evaluate, e.g. 'force, cycle 2'"
+
+def _group_option(count: str) -> Callable[[Function], Function]:
+    """``--group`` with a word on how many."""
+    return click.option(
+        "--group",
+        "groups",
+        multiple=True,
+        shell_complete=completion.groups,
+        help=f"Group as in the tables of navirl evaluate, e.g. 'force, cycle 2'; {count}.",
+    )
 
 
 @click.command(
@@ -27,9 +37,7 @@ _GROUP = "A group as in the tables of navirl evaluate, e.g. 'force, cycle 2'"
 )
 @page_options
 @demos_argument
-@section(
-    "Demonstrations", click.option("--group", "groups", multiple=True, help=f"{_GROUP}; repeatable; all by default.")
-)
+@section("Demonstrations", _group_option("repeatable; all by default"))
 @section("Learnt paths", reward_option, samples_option(), seed_option)
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
     """Draw how demonstrations rank among paths of the policy.
@@ -64,7 +72,7 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
 @section(
     "Compared",
     click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more."),
-    click.option("--group", "groups", multiple=True, help=f"{_GROUP}; give two or more."),
+    _group_option("give two or more"),
 )
 @section("Scene", trial_option, crop_option)
 def compare(

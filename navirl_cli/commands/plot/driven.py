@@ -7,14 +7,20 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.shared import (
+    demonstrations_in,
+    demos_argument,
+    finish,
+    progress_bar,
+    samples_option,
+    seed_option,
+)
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
     from navirl_cli.evaluation.compare import Comparison
-    from navirl_cli.figures.properties import PropertyBar
 
 
 @click.command(
@@ -62,15 +68,19 @@ def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed:
 
     As in Fig. 7 of the paper: means, with standard deviations as whiskers.
     """
+    from navirl_cli.evaluation.groups import group_of
     from navirl_cli.evaluation.metrics import PAPER_METRICS
-    from navirl_cli.figures.properties import draw_properties, height_for
+    from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 
     demonstrations = demonstrations_in(demos)
     learnt = None if reward is None else read_reward_for(reward, demonstrations)
-    bars = _bars(demonstrations, learnt, samples, seed)
+    result = _compared(demonstrations, learnt, samples, seed)
+    taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
+    bars = bars_of(result.groups, taught)
     page.draw(
         lambda axes: draw_properties(axes, bars), height_in=height_for(bars, page.width_in), panels=len(PAPER_METRICS)
     )
+    finish(result.notes)
 
 
 @click.command(
@@ -94,26 +104,20 @@ def forces(page: Page, demos: Path, trial: str | None, crop: bool) -> None:
     page.draw(lambda axes: draw_forces(axes, one, crop=crop), panels=2, columns=1)
 
 
-def _bars(
+def _compared(
     demonstrations: list["Demonstration"], learnt: LearntReward | None, samples: int, seed: int
-) -> list["PropertyBar"]:
-    """Bars of driven paths by group, and of learnt paths in the groups from which the reward was learnt."""
+) -> "Comparison":
+    """Properties of driven paths, and of the paths of a learnt policy, by group."""
     import numpy as np
 
     from navirl_cli.evaluation.compare import LEARNT, compare
     from navirl_cli.evaluation.drawn import Precision
-    from navirl_cli.evaluation.groups import group_of
-    from navirl_cli.figures.properties import bars_of
 
     with progress_bar("evaluate", len(demonstrations)) as update:
-        result: Comparison = compare(
+        return compare(
             demonstrations,
             {} if learnt is None else {LEARNT: learnt.reward},
             Precision(samples),
             np.random.default_rng(seed),
             progress=lambda done, _all: update(done, ""),
         )
-    taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
-    for note in result.notes:
-        say(note)
-    return bars_of(result.groups, taught)

@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
-from os import fsdecode
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from navirl_cli.commands.shared import force_option
+from navirl_cli.commands import completion
+from navirl_cli.commands.shared import force_option, output_option
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
@@ -22,22 +22,7 @@ if TYPE_CHECKING:
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is imported only to draw a figure.
 STYLES = ("paper", "screen", "dark")
 #: Extensions of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
-FORMATS = ("png", "pdf", "svg")
-
-
-class FigurePath(click.Path):
-    """The name of a figure's file, whose extension selects the format."""
-
-    def __init__(self) -> None:
-        super().__init__(path_type=Path)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Refuse an unknown extension."""
-        path = Path(fsdecode(super().convert(value, param, ctx)))
-        if path.suffix.lower().removeprefix(".") not in FORMATS:
-            *others, last = (f".{extension}" for extension in FORMATS)
-            self.fail(f"expected a name that ends in {', '.join(others)} or {last}, found {path.name!r}", param, ctx)
-        return path
+FORMATS = (".png", ".pdf", ".svg")
 
 
 @dataclass(frozen=True)
@@ -99,7 +84,7 @@ def page_options(function: Function) -> Function:
 
     figure_options = section(
         "Output",
-        click.option("-o", "--output", type=FigurePath(), required=True, help="Figure to write: .png, .pdf or .svg."),
+        output_option("Figure to write: .png, .pdf or .svg.", *FORMATS),
         click.option(
             "--wide", is_flag=True, help="Width of a page with two columns (7.16 in) instead of one column (3.5 in)."
         ),
@@ -116,7 +101,9 @@ def page_options(function: Function) -> Function:
 
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
-trial_option = click.option("--trial", help="Trial to draw, e.g. p01/3.  [default: the first]")
+trial_option = click.option(
+    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first]"
+)
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
 
 

@@ -1,0 +1,134 @@
+"""What the shell completes: names that the files at hand hold, and lists of names.
+
+Completion never raises and never prints: where something cannot be read there is nothing to propose.
+"""
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from io import StringIO
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+from warnings import catch_warnings, simplefilter
+
+import click
+from click.shell_completion import BashComplete, CompletionItem, add_completion_class
+
+#: What bash reads as more than itself.
+_SPECIAL, _ESCAPED = re.compile(r"[^\w,./:=@%+-]"), r"\\\g<0>"
+#: What click asks for proposals: the context with the words so far, the parameter, and the word at the cursor.
+Complete: TypeAlias = "Callable[[click.Context, click.Parameter, str], list[CompletionItem[str]]]"
+
+
+def use_whole_words() -> None:
+    """Have :class:`WholeWords` complete for bash."""
+    add_completion_class(WholeWords)
+
+
+def _proposed(names: Callable[[click.Context, str], Iterable[str]]) -> Complete:
+    """The names that begin with the word at the cursor; none where anything goes wrong."""
+
+    def complete(ctx: click.Context, _param: click.Parameter, incomplete: str) -> "list[CompletionItem[str]]":
+        with suppress(Exception), redirect_stdout(StringIO()), redirect_stderr(StringIO()), catch_warnings():
+            simplefilter("ignore")
+            return [CompletionItem(name) for name in names(ctx, incomplete) if name.startswith(incomplete)]
+        return []
+
+    return complete
+
+
+def _files(ctx: click.Context, name: str) -> list[Path]:
+    """The files of an argument; click leaves them among the other words while an option lacks its value."""
+    found = ctx.params.get(name) or ctx.args
+    return [Path(one) for one in ([found] if isinstance(found, Path) else found)]
+
+
+@_proposed
+def trials(ctx: click.Context, _incomplete: str) -> Iterator[str]:
+    """Ids of the demonstrations in the file on the command line."""
+    from navirl_cli.artefacts.demonstrations import read_demonstrations
+
+    return (one.id for one in read_demonstrations(_files(ctx, "demos")[0]))
+
+
+@_proposed
+def groups(ctx: click.Context, _incomplete: str) -> Iterable[str]:
+    """Groups of the demonstrations in the file on the command line, by the fields on it."""
+    from navirl_cli.artefacts.demonstrations import read_demonstrations
+    from navirl_cli.evaluation.groups import by_group
+
+    return by_group(read_demonstrations(_files(ctx, "demos")[0]), ctx.params.get("fields") or ())
+
+
+@_proposed
+def parameters(_ctx: click.Context, _incomplete: str) -> Iterator[str]:
+    """Parameters of the paper's reward."""
+    from navirl_cli.irl.reward import PAPER_TERMS, parameters_of
+
+    return (parameter.name for parameter in parameters_of(PAPER_TERMS))
+
+
+def initial(ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem[str]]":
+    """A list of parameters with each of those that it lacks, or a file."""
+    before, comma, name = incomplete.rpartition(",")
+    named = [part.partition("=")[0] for part in before.split(",")]
+    lacking = [one for one in parameters(ctx, param, name) if one.value not in named]
+    items = [CompletionItem(f"{before}{comma}{one.value}=") for one in lacking]
+    return items or [CompletionItem(incomplete, type="file")]
+
+
+@_proposed
+def metrics(_ctx: click.Context, incomplete: str) -> Iterator[str]:
+    """A list of metrics with each of those that it lacks, or all of them."""
+    from navirl_cli.evaluation.metrics import BY_NAME
+
+    before, comma, _ = incomplete.rpartition(",")
+    yield from (f"{before}{comma}{name}" for name in BY_NAME if name not in before.split(","))
+    if not before:
+        yield "all"
+
+
+@_proposed
+def topics(ctx: click.Context, _incomplete: str) -> Iterator[str]:
+    """ROLE=/topic for all topics of the logs on the command line that can have the role; ROLE= without a log."""
+    from navirl_cli.logs.messages.reader import scan
+    from navirl_cli.logs.roles.topics import ROLES, topics_of
+    from navirl_cli.logs.sources import sources_of
+
+    logs = _files(ctx, "logs")
+    found = topics_of(scan(path) for source in (sources_of(logs) if logs else ()) for path in source.files)
+    for role in ROLES:
+        types = {one.name for one in role.message_types}
+        yield from [f"{role.name}={one.name}" for one in found.values() if one.type_name in types] or [f"{role.name}="]
+
+
+class WholeWords(BashComplete):
+    """Completion for bash, which splits words at equals signs and reads blanks and quotation marks in proposals."""
+
+    name: ClassVar[str] = "bash"
+    #: What stands before the part of the word that bash replaces.
+    kept: str = ""
+
+    def get_completion_args(self) -> tuple[list[str], str]:
+        """The words before the cursor and the word at it, with those that bash split put together again."""
+        before, incomplete = super().get_completion_args()
+        words: list[str] = []
+        for part in (*before, incomplete):
+            self.kept = words.pop() if words and ("=" in {part, words[-1][-1:]} or not words[-1]) else ""
+            if part == "=" and self.kept.startswith("-"):  # --option=value
+                words += [self.kept, ""]
+                self.kept = ""
+            else:
+                words.append(f"{self.kept}{part}")
+        if incomplete == "=":  # bash puts the proposal behind it
+            self.kept = words[-1]
+        return words[:-1], words[-1]
+
+    def format_completion(self, item: "CompletionItem[Any]") -> str:
+        """The part of the word that bash replaces, escaped outside of quotation marks."""
+        value = str(item.value).removeprefix(self.kept)
+        words = os.environ["COMP_WORDS"].split("\n")[int(os.environ["COMP_CWORD"]) :]
+        quoted = bool(words) and words[0].startswith(("'", '"'))
+        word = value if quoted else _SPECIAL.sub(_ESCAPED, value)
+        return f"{item.type},{word}".replace("\\", "\\\\")  # click's script reads it with backslashes

@@ -1,0 +1,127 @@
+"""One rule of exit codes for all commands: 2 usage, 1 data and files, 3 losses, 130 interrupted."""
+
+from pathlib import Path
+
+import click
+import pytest
+from command_line import commands, options
+from robot_log import Run, write_run
+
+from navirl_cli.commands.types import Choice, Count, Number, OutputPath, Point, RoleTopic
+
+EVERY = [pytest.param(words, command, id=" ".join(words)) for words, command in commands()]
+#: Words that no option of a type takes.
+WRONG = {Choice: "nonsense", Count: "-1000000", Number: "nan", OutputPath: "x.doc", Point: "here", RoleTopic: "ft"}
+
+
+def least(words, command):
+    """The words that a command needs at least, with files that do not exist."""
+    given = [*words]
+    for param in command.params:
+        if isinstance(param, click.Argument):
+            given.append("none.json")
+        elif param.required:
+            ending = param.type.endings[0] if isinstance(param.type, OutputPath) else ""
+            given += [param.opts[0], f"none{ending}"]
+    return [*given, *(("--group", "a", "--group", "b") if words == ("plot", "compare") else ())]
+
+
+def wrong_values():
+    for words, command in commands():
+        for option in options(command):
+            for kind, value in WRONG.items():
+                if type(option.type) is kind:
+                    yield pytest.param(
+                        [*least(words, command), option.opts[-1], value], id=f"{' '.join(words)} {option.opts[-1]}"
+                    )
+
+
+@pytest.mark.parametrize("words", list(wrong_values()))
+def test_a_value_that_cannot_be_right_is_wrong_usage(navirl, tmp_path, words):
+    assert "Error: Invalid value for '" in navirl(*words, code=2).stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("words", "command"), EVERY)
+def test_missing_and_unknown_words_are_wrong_usage(navirl, tmp_path, words, command):
+    assert "Error: Missing " in navirl(*words, code=2).stderr
+    assert "No such option" in navirl(*least(words, command), "--nonsense", code=2).stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+FIT, EVALUATE = ("fit", "demos.json", "-o", "x.json"), ("evaluate", "demos.json")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("extract", "a.mcap", "-o", "x.json", "--no-wrench", "--gain"), "--no-wrench excludes --gain, --wrench-frame"),
+        (("extract", "a.mcap", "-o", "x.json", "--no-wrench", "--topic", "wrench=/a"), "--no-wrench excludes --gain"),
+        (("extract", "a.mcap", "-o", "./a.mcap", "--force"), "expected another file than the input a.mcap"),
+        (("extract", "a.mcap", "--map", "m.yaml", "-o", "m.yaml"), "expected another file than the input m.yaml"),
+        (("fit", "demos.json", "-o", "demos.json", "--force"), "expected another file than the input demos.json"),
+        ((*FIT, "--prior", "x.json"), "expected another file than the input x.json"),
+        ((*FIT, "--init", "c0=a"), "expected name=number once each, found 'c0=a'"),
+        ((*FIT, "--init", "c7=1"), "expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c7'"),
+        ((*FIT, "--init", "c0=-50,c0=-60"), "expected name=number once each, found 'c0=-60'"),
+        ((*FIT, "--init", "c0=5"), "c0 = 5 1/m is outside its bounds"),
+        ((*FIT, "--prior", "r.json", "--cross-validate", "participant"), "--cross-validate and --prior exclude each"),
+        ((*FIT, "--correct-bias", "--bootstrap", "5"), "--correct-bias needs all steps and no prior"),
+        ((*FIT, "--correct-bias", "--steps", "contact"), "--correct-bias needs all steps and no prior"),
+        ((*FIT, "--correct-bias", "--l2", "1"), "expected --l2 <= 0.001, found 1"),
+        ((*EVALUATE, "--ranks"), "--ranks needs one --reward"),
+        ((*EVALUATE, "--reward", "a/r.json", "--reward", "b/r.json"), "--reward: expected files of different names"),
+        ((*EVALUATE, "--pair", "joystick", "joystick"), "--pair: expected two groups, found 'joystick' twice"),
+        ((*EVALUATE, "--metrics", "length_m,"), "expected one of 'length_m', "),
+        ((*EVALUATE, "--format", "json"), "expected one of 'text', 'csv', 'markdown', 'latex', found 'json'"),
+        ((*EVALUATE, "-o", "m.txt"), "expected a name that ends in .json, .csv, .md or .tex, found 'm.txt'"),
+        ((*EVALUATE, "-o", "demos.json", "--force"), "expected another file than the input demos.json"),
+        (("report", "demos.json", "r.json", "-o", "page.pdf"), "expected a name that ends in .html, found"),
+        (("plot", "compare", "demos.json", "-o", "x.png"), "compare needs two or more --reward"),
+        (("study", "a.mcap", "-o", "x", "--topic", "lidar=/scan"), "role: expected one of 'wrench', "),
+    ],
+)  # fmt: skip
+def test_words_that_cannot_be_right_together_are_wrong_usage(navirl, tmp_path, words, message):
+    assert message in " ".join(navirl(*words, code=2).stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("words", "command"), [one for one in EVERY if one.id != "simulate"])
+def test_files_that_do_not_exist_are_one_line(navirl, tmp_path, words, command):
+    result = navirl(*least(words, command), code=1)
+    assert result.stderr.startswith("navirl: none.json: ")
+    assert result.stderr.count("\n") == 1
+    assert result.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("words", "command"), [one for one in EVERY if one.id != "inspect"])
+def test_existing_files_are_not_replaced(navirl, tmp_path, words, command):
+    given = [str(word) for word in least(words, command)]
+    if "-o" not in given:
+        given += ["-o", "none.csv"]
+    output = Path(given[given.index("-o") + 1])
+    output.write_text("mine")
+    result = navirl(*given, code=1)
+    assert result.stderr.startswith(("navirl: none", f"navirl: {output}"))
+    assert output.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [tmp_path / output]
+
+
+@pytest.mark.parametrize("words", [("inspect",), ("extract", "-o", "x.json")], ids=" ".join)
+def test_losses_are_listed_and_exit_with_3(navirl, tmp_path, words):
+    log = write_run(tmp_path / "run.mcap", Run())
+    log.write_bytes(log.read_bytes()[:-30])
+    result = navirl(words[0], log.name, *words[1:], code=3)
+    assert "run" in result.stdout
+    assert result.stderr.startswith("navirl: run.mcap: bytes ")
+
+
+@pytest.mark.parametrize(("words", "command"), EVERY)
+def test_an_interrupt_is_one_line_and_130(navirl, monkeypatch, words, command):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "callback", interrupted)
+    result = navirl(*least(words, command), code=130)
+    assert (result.stdout, result.stderr) == ("", "navirl: interrupted\n")
