@@ -1,18 +1,20 @@
 """Bootstrap, profile likelihoods and cross-validation in reward files."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from navirl_cli.artefacts.store import number, numbers, row
 from navirl_cli.errors import ArtefactError
-from navirl_cli.irl.bootstrap import Bootstrap
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.validation import Validation
+
+if TYPE_CHECKING:  # a reader of rewards does not draw again or leave out
+    from navirl_cli.irl.bootstrap import Bootstrap
+    from navirl_cli.irl.validation import Validation
 
 
-def bootstrap_document(found: Bootstrap) -> dict[str, Any]:
+def bootstrap_document(found: "Bootstrap") -> dict[str, Any]:
     """Bootstrap draws with their standard errors and 95 % intervals."""
     lower, upper = found.interval()
     return {
@@ -66,7 +68,7 @@ def profile_of(document: dict[str, Any], names: Sequence[str], path: str) -> Pro
     return Profile(name, values, relative, np.array(theta), document["level"], document["lower"], document["upper"])
 
 
-def validation_document(found: Validation) -> dict[str, Any]:
+def validation_document(found: "Validation") -> dict[str, Any]:
     """Cross-validation by participant left out."""
     return {
         "left_out": list(found.participants),

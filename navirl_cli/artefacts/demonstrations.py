@@ -4,19 +4,21 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
-from navirl_cli.demos.extract import ExtractSettings
-from navirl_cli.demos.gain import Gain, pooled
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
 from navirl_cli.files import Input
-from navirl_cli.logs.load import Forces, LoadOptions
+
+if TYPE_CHECKING:  # commands that only read demonstrations need neither logs nor their extraction
+    from navirl_cli.demos.extract import ExtractSettings
+    from navirl_cli.demos.gain import Gain
+    from navirl_cli.logs.load import LoadOptions
 
 #: Larger numbers are refused: no trial holds them, and they would need unlimited memory. In the units of the lists.
 _MOST = {"t_s": 1e6, "x_m": 1e8, "y_m": 1e8, "yaw_rad": 1e6, "force_x_n": 1e6, "force_y_n": 1e6}
@@ -44,7 +46,7 @@ def demonstrations_document(
     }
 
 
-def settings_document(settings: ExtractSettings, options: LoadOptions, map_file: Path | None) -> dict[str, Any]:
+def settings_document(settings: "ExtractSettings", options: "LoadOptions", map_file: Path | None) -> dict[str, Any]:
     """The settings of an extraction.
 
     Args:
@@ -52,6 +54,8 @@ def settings_document(settings: ExtractSettings, options: LoadOptions, map_file:
         options: The user's choices about the logs.
         map_file: The map in place of the log's.
     """
+    from navirl_cli.logs.load import Forces
+
     return asdict(settings) | {
         "topics": {role: list(names) for role, names in options.topics.items()},
         "time": options.time.value,
@@ -62,8 +66,10 @@ def settings_document(settings: ExtractSettings, options: LoadOptions, map_file:
     }
 
 
-def gain_document(gains: Sequence[tuple[str, Gain | None]]) -> dict[str, Any] | None:
+def gain_document(gains: "Sequence[tuple[str, Gain | None]]") -> dict[str, Any] | None:
     """The gain of each recording with the name of its log, and of all together. None if no trial holds a push."""
+    from navirl_cli.demos.gain import pooled
+
     known = [(log, gain) for log, gain in gains if gain is not None]
     if not known:
         return None
