@@ -65,6 +65,9 @@ def cli(debug: bool) -> None:
 
 def main() -> None:
     """Entry point of the command ``navirl``."""
+    # Our matrices are sparse or small: the threads of a BLAS would cost more at the start than they give back. They are
+    # set before numpy is imported, and only where the user has not set them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "_NAVIRL_COMPLETE" in os.environ:
         from navirl_cli.commands.completion import use_whole_words
 

@@ -323,3 +323,15 @@ def test_simulate_writes_logs_that_extract_reads(navirl):
     assert "exists already" in navirl("simulate", "-o", "logs", "--participants", "1", code=1).stderr
     Path("file").write_text("")
     assert "file: cannot be made a folder" in navirl("simulate", "-o", "file", code=1).stderr
+
+
+@pytest.mark.parametrize(("given", "expected"), [(None, "1"), ("3", "3")])
+def test_one_thread_of_blas_unless_the_user_says_otherwise(given, expected):
+    code = (
+        "import os, sys\nfrom navirl_cli.cli import main\nsys.argv[1:] = ['--version']\n"
+        "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    env |= {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    out = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+    assert out.split()[-1] == expected

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from navirl_cli.arrays import BoolArray, ByContent, FloatArray, IntArray
+from navirl_cli.demos.cells import connected_to
 from navirl_cli.errors import GridError
 
 #: (8, 2) displacements (dx, dy) of the moves in cells, counter-clockwise from the x axis. All arrays "by move" have
@@ -109,12 +110,7 @@ class Grid(ByContent):
 
     def connected_to(self, cell: ArrayLike) -> BoolArray:
         """(rows, columns) cells that eight-connected moves over free cells reach from a (2,) free cell on the grid."""
-        from scipy.ndimage import label
-
-        labels, _ = label(~self.occupied, structure=np.ones((3, 3)))
-        column, row = np.asarray(cell)
-        reached: BoolArray = labels == labels[row, column]
-        return reached
+        return connected_to(~self.occupied, cell)
 
     def freed(self, cells: IntArray) -> "Grid":
         """The same grid with (n, 2) cells free.

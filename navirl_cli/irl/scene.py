@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.cells import distances_to
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import SceneError
@@ -85,13 +86,10 @@ class Scene:
     @cached_property
     def deviation_m(self) -> FloatArray:
         """(n,) distance d(s) of every cell's centre to the nearest cell of the nominal path, m (Eq. 11)."""
-        from scipy.ndimage import distance_transform_edt
-
-        away = np.ones(self.lattice.grid.shape, dtype=bool)
-        columns, rows = self.lattice.cells[self.nominal].T
-        away[rows, columns] = False
-        distance = distance_transform_edt(away) * self.lattice.grid.resolution_m
-        deviation: FloatArray = distance[self.lattice.cells[:, 1], self.lattice.cells[:, 0]]
+        nominal = np.zeros(self.lattice.grid.shape, dtype=bool)
+        columns, rows = self.lattice.cells.T
+        nominal[rows, columns] = self.nominal
+        deviation: FloatArray = distances_to(nominal)[rows, columns] * self.lattice.grid.resolution_m
         return deviation
 
     def nominal_line_m(self) -> FloatArray:

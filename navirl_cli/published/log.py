@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.cells import distances_to
 from navirl_cli.demos.grid import INSCRIBED, LETHAL
 from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Occupancy
@@ -216,12 +217,10 @@ def ring_m(occupancy: Occupancy) -> float | None:
 
     None where the map has no such ring.
     """
-    from scipy.ndimage import distance_transform_edt
-
     ring, obstacles = occupancy.data == INSCRIBED, occupancy.data == LETHAL
     if not (ring.any() and obstacles.any()):
         return None
-    cells = distance_transform_edt(~obstacles)[ring].max()
+    cells = distances_to(obstacles)[ring].max()
     return round(float(cells) * occupancy.resolution_m, 6)
 
 
