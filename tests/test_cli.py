@@ -91,7 +91,9 @@ def test_extract_prints_a_row_a_trial(navirl, tmp_path):
 
 
 def test_extract_json_has_numbers(navirl, tmp_path):
-    (row,) = json.loads(navirl("extract", log_with(tmp_path), "-o", "demos.json", "--json").stdout)
+    document = json.loads(navirl("extract", log_with(tmp_path), "-o", "demos.json", "--json").stdout)
+    assert (list(document), document["gain"]) == (["trials", "gain"], None)
+    (row,) = document["trials"]
     assert (row["trial"], row["cells"], row["cycle"]) == ("run/1", 41, None)
     assert row["impulse_n_s"] == pytest.approx(24, abs=0.6)
 
@@ -318,7 +320,11 @@ def test_plot_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
 
 def test_simulate_writes_logs_that_extract_reads(navirl):
     out = navirl("simulate", "-o", "logs", "--participants", "1", "--seed", "3").stdout
-    assert "p01.mcap" in out
+    assert [line.split()[:2] for line in out.splitlines()] == [["log", "trials"], ["logs/p01.mcap", "7"]]
+    document = json.loads(navirl("simulate", "-o", "again", "--participants", "1", "--seed", "3", "--json").stdout)
+    size = Path("again/p01.mcap").stat().st_size
+    assert document == {"logs": [{"log": "again/p01.mcap", "trials": 7, "size_bytes": size}]}
+    assert Path("again/p01.mcap").read_bytes() == Path("logs/p01.mcap").read_bytes()
     navirl("extract", "logs/p01.mcap", "-o", "demos.json")
     assert "exists already" in navirl("simulate", "-o", "logs", "--participants", "1", code=1).stderr
     Path("file").write_text("")

@@ -98,7 +98,7 @@ def test_inspect_lists_damage(written, navirl, broken):
     result = navirl("inspect", *inside, path, code=3)
     assert re.search(rf"^navirl: .*run\.mcap: (bytes .*: )?{words}", result.stderr, re.MULTILINE)
     assert "/wrench" in result.stdout
-    (document,) = json.loads(navirl("inspect", "--json", *inside, path, code=3).stdout)
+    (document,) = json.loads(navirl("inspect", "--json", *inside, path, code=3).stdout)["logs"]
     (told,) = document["damage"]
     assert re.search(words, told)
 

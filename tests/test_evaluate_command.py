@@ -43,7 +43,7 @@ def test_all_metrics_are_listed_without_a_file(navirl):
         assert re.search(rf"^{metric.name} +{re.escape(metric.unit)} +{metric.paths} +{needs} ", text, re.MULTILINE)
         assert metric.definition in text
     shown = json.loads(navirl("evaluate", "--list-metrics", "--json").stdout)
-    assert [one["name"] for one in shown] == [metric.name for metric in METRICS]
+    assert [one["name"] for one in shown["metrics"]] == [metric.name for metric in METRICS]
     assert navirl("evaluate", "--list-metrics", "--format", "markdown").stdout.startswith("| name ")
 
 

@@ -191,7 +191,8 @@ def test_the_filter_is_the_users(navirl, tmp_path):
     log = write_run(tmp_path / "run.mcap", PUSHED)
     peaks = []
     for hz in ("0.3", "5"):
-        (row,) = json.loads(navirl("extract", log, "-o", f"{hz}.json", "--wrench-filter", hz, "--json").stdout)
+        shown = json.loads(navirl("extract", log, "-o", f"{hz}.json", "--wrench-filter", hz, "--json").stdout)
+        (row,) = shown["trials"]
         peaks.append(row["peak_force_n"])
     assert peaks[0] < 0.9 * peaks[1]
     assert read_json(Path("0.3.json"), "demonstrations")["settings"]["push"]["cutoff_hz"] == 0.3

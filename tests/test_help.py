@@ -1,5 +1,6 @@
 """The help of every command: options in sections, examples that run."""
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -104,6 +105,48 @@ def marked(line):
     """An example as a parameter; those that take long are slow."""
     words = line.removeprefix("navirl ")
     return pytest.param(line, id=words, marks=[pytest.mark.slow] if words in SLOW else [])
+
+
+#: Words after which each command prints its table, but for those that print only the name of a file.
+TABLES = {
+    "inspect": ["p01.mcap"],
+    "extract": ["p01.mcap", "-o", "new.json"],
+    "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
+    "evaluate": ["demos.json"],
+    "import-study": ["runs.tar.gz", "-o", "new"],
+    "simulate": ["--participants", "1", "-o", "new"],
+    "study": ["demos.json", "--samples", "20", "-o", "new"],
+}
+
+
+def test_every_command_that_prints_a_table_has_json():
+    for words, command in commands():
+        assert ("--json" in {name for option in options(command) for name in option.opts}) == (words[0] in TABLES)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "study" else []) for name in TABLES]
+)
+def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    for path in folder.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    result = CliRunner().invoke(cli, [name, *TABLES[name], "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert isinstance(document, dict)
+    assert not [key for key in keys_in(document) if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", key)]
+
+
+def keys_in(document):
+    """All keys."""
+    if isinstance(document, list):
+        for one in document:
+            yield from keys_in(one)
+    elif isinstance(document, dict):
+        for key, value in document.items():
+            yield from keys_in(value)
+            yield key
 
 
 @pytest.mark.parametrize("line", [marked(line) for words, _ in commands() for line in examples_in(help_of(*words))])

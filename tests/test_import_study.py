@@ -85,7 +85,7 @@ def test_what_is_lost_is_reported_and_the_rest_is_written(navirl, study):
         "protocol 0, as the study is published, found operation 'h' before byte 1 of 5; download the file from its "
         "authors again (and 1 more)"
     )
-    assert "p2.mcap      10  not known" in result.stdout
+    assert "p2.mcap      10  unknown" in result.stdout
 
 
 def test_no_usable_data_is_an_expected_error(navirl, study):
@@ -93,7 +93,7 @@ def test_no_usable_data_is_an_expected_error(navirl, study):
     write(study / "runs" / "p3", {"force_demos.pkl": b"hello"})
     result = navirl("import-study", "runs", "-o", "logs", code=1)
     assert result.stderr.splitlines()[-1] == (
-        "navirl: runs: expected the study's published files, found nothing that can be used; fetch them anew"
+        "navirl: runs: expected published files of the study, found none that can be used; fetch them again"
     )
     assert "navirl: runs/p3: expected demonstrations and a map, found none" in result.stderr
     assert not (study / "logs").exists()

@@ -67,7 +67,7 @@ def inspect(navirl):
 
     def run(*words, code=0):
         result = navirl("inspect", "--json", *words, code=code)
-        document = json.loads(result.stdout)
+        document = json.loads(result.stdout)["logs"]
         Draft202012Validator(SCHEMA).validate(document)
         return document, result.stderr
 

@@ -198,7 +198,7 @@ def evaluate(
 def _list_metrics(how: Format, *, as_json: bool) -> None:
     """Print all metrics."""
     if as_json:
-        echo_json(metrics_table().records())
+        echo_json({"metrics": metrics_table().records()})
     else:
         click.echo(written(metrics_table(), how))
 

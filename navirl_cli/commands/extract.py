@@ -1,8 +1,6 @@
 """``navirl extract``: logs to demonstrations."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -30,7 +28,6 @@ from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.demos.trials import Split
-from navirl_cli.documents.tables import Table
 from navirl_cli.documents.text import to_text
 from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
@@ -189,16 +186,11 @@ def extract(
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
     write_json(output, "demonstrations", document, force=force)
-    _echo(trial_table(demonstrations), document, as_json=as_json)
+    trials, gains = trial_table(demonstrations), document.get("gain")
+    if as_json:
+        echo_json({"trials": trials.records(), "gain": gains})
+    else:
+        echo(to_text([trials, *([gain_table(gains)] if gains else [])]))
     for line in merged([*found.notes(demonstrations), *published_notes(found.extractions)]):
         say(line)
     finish(found.lost)
-
-
-def _echo(trials: Table, document: Mapping[str, Any], *, as_json: bool) -> None:
-    """The trials, and the gain where it was asked for."""
-    if as_json:
-        rows = trials.records()
-        echo_json({"trials": rows, "gain": document["gain"]} if "gain" in document else rows)
-    else:
-        echo(to_text([trials, *([gain_table(document["gain"])] if document.get("gain") else [])]))

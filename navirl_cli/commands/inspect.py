@@ -60,7 +60,7 @@ def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: 
     if refused and not views:
         raise refused[0]
     if as_json:
-        echo_json([overview_document(view) for view in views])
+        echo_json({"logs": [overview_document(view) for view in views]})
     else:
         echo(to_text(block for view in views for block in overview_report(view)))
     for view in views:

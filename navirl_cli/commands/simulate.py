@@ -1,16 +1,21 @@
 """``navirl simulate``: logs of simulated people pushing a simulated robot."""
 
-from functools import partial
 from pathlib import Path
 
 import click
 
-from navirl_cli.commands.shared import force_option, output_option, progress_bar, seed_option
+from navirl_cli.commands.shared import (
+    echo,
+    echo_json,
+    force_option,
+    json_option,
+    output_option,
+    progress_bar,
+    seed_option,
+)
 from navirl_cli.commands.types import Count
 from navirl_cli.commands.usage import Command, Example, section
-from navirl_cli.documents.tables import Cell, Column, Table, written
-from navirl_cli.files import check_writable, new_folder
-from navirl_cli.parallel import map_in_order
+from navirl_cli.documents.tables import written
 
 
 @click.command(
@@ -25,8 +30,8 @@ from navirl_cli.parallel import map_in_order
     click.option("--participants", default=3, show_default=True, type=Count(1, 99), help="Number of participants."),
     seed_option,
 )
-@section("Output", output_option("Folder of the logs; created if it does not exist."), force_option)
-def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
+@section("Output", output_option("Folder of the logs; created if it does not exist."), json_option, force_option)
+def simulate(participants: int, seed: int, output: Path, as_json: bool, force: bool) -> None:
     """Simulate people who push a robot, and write logs with known truth.
 
     Each participant has a reward of their own, drawn around the published one, and pushes the robot toward paths that
@@ -34,23 +39,13 @@ def simulate(output: Path, participants: int, seed: int, force: bool) -> None:
     obstacle avoidance. The metadata record navirl.truth holds the true rewards, paths and forces; no other command
     reads it.
     """
-    paths = [output / f"p{number:02d}.mcap" for number in range(1, participants + 1)]
-    rows: list[tuple[Cell, ...]] = []
-    with new_folder(output), progress_bar("simulate", participants) as update:
-        for path in paths:
-            check_writable(path, force=force)
-        work = partial(_simulated, seed=seed, force=force)
-        for row in map_in_order(work, list(enumerate(paths, start=1))):
-            rows.append(row)
-            update(len(rows), str(row[0]))
-    columns = (Column("log"), Column("trials"), Column("size_bytes", "size MB", decimals=2, scale=1e-6))
-    click.echo(written(Table(columns, tuple(rows))))
+    from navirl_cli.reports.logs import simulated_table
+    from navirl_cli.simulation.log import write_logs
 
-
-def _simulated(job: tuple[int, Path], seed: int, force: bool) -> tuple[Cell, ...]:
-    """One participant's log, as a row of the table."""
-    from navirl_cli.simulation.log import write_log
-
-    number, path = job
-    session = write_log(number, seed, path, force=force)
-    return str(path), len(session.passes), path.stat().st_size
+    with progress_bar("simulate", participants) as update:
+        logs = write_logs(output, participants, seed, force=force, progress=update)
+    table = simulated_table(logs)
+    if as_json:
+        echo_json({"logs": table.records()})
+    else:
+        echo(written(table))

@@ -1,7 +1,10 @@
 """A participant's published paths written as the MCAP log that a robot would have recorded."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,9 +13,13 @@ import numpy as np
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.cells import distances_to
 from navirl_cli.demos.grid import INSCRIBED, LETHAL
+from navirl_cli.errors import ArtefactError
+from navirl_cli.files import check_writable, new_folder
 from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import PUBLISHED_RECORD, SESSION_RECORD, Occupancy
-from navirl_cli.published.participant import Participant, PublishedPath
+from navirl_cli.parallel import map_in_order
+from navirl_cli.published.participant import Participant, PublishedPath, participant_of
+from navirl_cli.published.runs import Run
 
 #: The paper's speed along x (v_nav, Sec. V), m/s, at which positions are laid out, because they come without times.
 SPEED_M_S: Final = 0.4
@@ -94,6 +101,65 @@ def _headings(steps: FloatArray, lengths_m: FloatArray) -> FloatArray:
     x, y = steps[seen[np.maximum(last, 0)]].T
     yaw: FloatArray = np.arctan2(y, x)
     return yaw
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The log of a published participant."""
+
+    participant: str
+    #: What could not be used, in words.
+    lost: tuple[str, ...]
+    #: None where nothing could be used.
+    path: Path | None = None
+    trials: int = 0
+    #: Times in which the obstacle course was completed, s, by modality.
+    completion_s: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    size_bytes: int = 0
+
+
+def write_logs(
+    runs: Sequence[Run],
+    folder: Path,
+    *,
+    force: bool,
+    progress: Callable[[int, str], None] | None = None,
+    executor: Executor | None = None,
+) -> list[Imported]:
+    """Write one log for each participant.
+
+    Args:
+        runs: Their published files.
+        folder: Where to write; created if it does not exist.
+        force: Replace existing files.
+        progress: Called with the number of participants done and the name of the last.
+        executor: Where to work; by default local processes.
+
+    Raises:
+        ArtefactError: A log exists already, or cannot be written.
+    """
+    jobs = [(number, run, folder / f"{run.name}.mcap") for number, run in enumerate(runs)]
+    imported = []
+    with new_folder(folder):
+        for _, _, path in jobs:
+            check_writable(path, force=force)
+        for one in map_in_order(partial(_imported, force=force), jobs, executor):
+            imported.append(one)
+            if progress is not None:
+                progress(len(imported), one.participant)
+    return imported
+
+
+def _imported(job: tuple[int, Run, Path], *, force: bool) -> Imported:
+    """Write the log of one participant."""
+    number, run, path = job
+    try:
+        participant = participant_of(run)
+    except ArtefactError as error:
+        return Imported(run.name, (str(error),))
+    write_log(participant, number, path, force=force)
+    times = dict(participant.completion_s)
+    return Imported(run.name, participant.lost, path, len(participant.paths), times, path.stat().st_size)
 
 
 def write_log(participant: Participant, number: int, path: Path, *, force: bool) -> None:

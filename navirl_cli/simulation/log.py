@@ -3,7 +3,10 @@
 import base64
 import json
 import zlib
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -11,8 +14,10 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.demonstration import Condition
+from navirl_cli.files import check_writable, new_folder
 from navirl_cli.logs.messages.writer import LogWriter, header, message_type, planar_pose
 from navirl_cli.logs.recording import SESSION_RECORD
+from navirl_cli.parallel import map_in_order
 from navirl_cli.simulation import protocol, sensors
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
 from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M
@@ -73,6 +78,56 @@ def lay_out(session: protocol.Session) -> Timeline:
         here = one.drive.xy_m[-1]
         line.add(protocol.standing(here, protocol.STAND_AFTER_S))
     return line
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The log of a simulated participant."""
+
+    path: FilePath
+    trials: int
+    size_bytes: int
+
+
+def write_logs(
+    folder: FilePath,
+    participants: int,
+    seed: int,
+    *,
+    force: bool,
+    progress: Callable[[int, str], None] | None = None,
+    executor: Executor | None = None,
+) -> list[Simulated]:
+    """Simulate participants and write one log each, p01.mcap and so on.
+
+    Args:
+        folder: Where to write; created if it does not exist.
+        participants: Number of participants.
+        seed: Of the study.
+        force: Replace existing files.
+        progress: Called with the number of logs written and the name of the last.
+        executor: Where to simulate; by default local processes.
+
+    Raises:
+        ArtefactError: A log exists already, or cannot be written.
+    """
+    jobs = [(number, folder / f"p{number:02d}.mcap") for number in range(1, participants + 1)]
+    written = []
+    with new_folder(folder):
+        for _, path in jobs:
+            check_writable(path, force=force)
+        for one in map_in_order(partial(_simulated, seed=seed, force=force), jobs, executor):
+            written.append(one)
+            if progress is not None:
+                progress(len(written), one.path.name)
+    return written
+
+
+def _simulated(job: tuple[int, FilePath], seed: int, *, force: bool) -> Simulated:
+    """Write the log of one participant."""
+    number, path = job
+    session = write_log(number, seed, path, force=force)
+    return Simulated(path, len(session.passes), path.stat().st_size)
 
 
 def write_log(number: int, seed: int, path: FilePath, *, force: bool) -> protocol.Session:
