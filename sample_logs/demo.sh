@@ -18,4 +18,4 @@ run plot reward demo/demos.json --reward demo/reward.json --trial p01/3 -o demo/
 run plot properties demo/demos.json --reward demo/reward.json -o demo/properties.png --force
 run plot profile demo/reward.json -o demo/profile.png --force
 run study sample_logs/p01.mcap sample_logs/p02.mcap sample_logs/p03.mcap -o demo/study --force
-printf '\ndemo/ holds demos.json, reward.json, metrics.json, five figures, and in study/ the report of a study.\n'
+python3 sample_logs/demo_summary.py demo

@@ -47,13 +47,6 @@ def test_help_lists_each_command_as_it_describes_itself(navirl):
         assert command.help.split(".")[0] in " ".join(navirl(name, "--help").output.split())
 
 
-def test_help_imports_nothing_heavy():
-    code = "import sys; from navirl_cli.cli import cli; cli(['--help'], standalone_mode=False); print(*sys.modules)"
-    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert not {"numpy", "scipy", "matplotlib", "mcap", "rosbags", "jsonschema"} & set(modules)
-    assert "click" in modules
-
-
 def test_an_unknown_command_and_no_command(navirl):
     assert "command: expected one of 'inspect', 'extract', 'fit', " in navirl("learn", code=2).stderr
     assert "Usage" in navirl(code=2).output

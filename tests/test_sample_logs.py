@@ -1,7 +1,5 @@
 """From the sample logs to the truth of the simulation that wrote them."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +39,6 @@ def second_cycles(pairs):
 @pytest.fixture(scope="module")
 def pooled(second_cycles):
     return fit(evidence_of(second_cycles), Reward.named({}))
-
-
-def test_an_extraction_imports_no_scipy(tmp_path):
-    words = ["extract", str(LOGS[0]), "-o", str(tmp_path / "demos.json"), "--gain"]
-    code = f"import sys; from navirl_cli.cli import cli; cli({words}, standalone_mode=False); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"scipy", "jsonschema", "matplotlib", "PIL"} & set(done.stdout.split())
 
 
 def test_three_participants_of_at_most_6_mb():
