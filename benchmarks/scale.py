@@ -1,6 +1,6 @@
 """Measure how one gradient of one demonstration's likelihood grows with the map, from a thousand cells to a million.
 
-python benchmarks/scale.py [--quick] [--json] [--plot FILE]. Three series: an open hall at a cost of way of -54 /m
+python benchmarks/scale.py [--quick] [--json] [--plot FILE]. Three series: an open hall at a cost of length of -54 /m
 (that of the study) and of -25 /m (near where the partition function ceases to be finite), and an office floor at -54
 /m. Every line is a process of its own, whose peak memory includes the interpreter, and the building of the scene,
 which has a column of its own: lattice, shortest paths, nominal cells. Time is the median of a few gradients after a
@@ -43,7 +43,7 @@ PATIENCE_S = 5.0
 
 @dataclass(frozen=True)
 class Series:
-    """Maps of one kind under one cost of way."""
+    """Maps of one kind under one cost of length."""
 
     kind: str
     c0: float

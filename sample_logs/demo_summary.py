@@ -45,8 +45,8 @@ def sentences(
         f"learnt policy keeps {least['learnt']:.2f} m, obstacle avoidance alone {least['avoidance']:.2f} m."
     )
     tested = (
-        f"Of {len(verdicts)} claims of the paper that these logs can test, {verdicts.count('holds')} hold and "
-        f"{verdicts.count('not settled')} are not settled with {len(study['participants'])} participants."
+        f"study tested {len(verdicts)} claims of the paper with {len(study['participants'])} participants: "
+        f"{verdicts.count('holds')} supported, {verdicts.count('not settled')} not settled."
     )
     return [found, learnt, predicted, measured, tested]
 

@@ -30,10 +30,7 @@ def test_the_summary_holds_the_numbers_of_the_run(navirl, tmp_path):
     reward = json.loads((demo / "reward.json").read_text())
     assert f"costs {-reward['parameters'][2]['value']:.1f}," in text
     assert f"{reward['cross_validation']['models']['learnt']['log_likelihood_per_step']:.3f} nats per step" in text
-    assert (
-        "5. Of 2 claims of the paper that these logs can test, 0 hold and 2 are not settled with 2 participants."
-        in text
-    )
+    assert "5. study tested 2 claims of the paper with 2 participants: 0 supported, 2 not settled." in text
     assert text.endswith("\nLook first at demo/policy.png, then open demo/study/report.html.\n")
 
 

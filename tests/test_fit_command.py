@@ -309,11 +309,11 @@ def test_what_is_read_is_not_replaced(navirl, files):
 
 def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monkeypatch):
     def nothing(*_args, **_options):
-        raise RewardError("`profile` a_p: a better fit was found on the way")
+        raise RewardError("`profile` a_p: a better fit was found")
 
     monkeypatch.setattr("navirl_cli.irl.analyses.profile", nothing)
     told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
-    assert told.stderr.endswith("navirl: --profile a_p: a better fit was found on the way\n")
+    assert told.stderr.endswith("navirl: --profile a_p: a better fit was found\n")
     assert read_reward(Path("r.json")).profiles == ()
 
 

@@ -118,7 +118,7 @@ def test_regulariser_and_prior_are_kept(evidence):
 
 
 def test_where_the_data_set_no_bound_the_end_is_open():
-    # On a corridor of one cell the likelihood only rises with the cost of way.
+    # On a corridor of one cell the likelihood only rises with the cost of length.
     grid = make.open_grid(12, 1)
     evidence = evidence_of([make.demonstration(grid, [[c, 0] for c in range(12)])] * 6)
     found = fit(evidence, Reward((-50.0,), START.terms[:1]), 0.0)
@@ -165,9 +165,7 @@ def test_a_better_fit_on_the_way_is_said_with_the_way_there(evidence, found):
     # A fit that is none: its objective is lower than what the others reach without it.
     theta = (found.reward.theta[0] - 8.0, *found.reward.theta[1:])
     fake = replace(found, reward=Reward(theta), objective=log_likelihood(evidence, Reward(theta)))
-    with pytest.raises(
-        RewardError, match=r"`profile` c0: a better fit was found on the way; fit again with `init` c0=-"
-    ):
+    with pytest.raises(RewardError, match=r"`profile` c0: a better fit was found; fit again with `init` c0=-"):
         profile(evidence, fake, "c0")
 
 

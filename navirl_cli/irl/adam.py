@@ -1,6 +1,6 @@
 """Gradient ascent by Adam as the paper's study ran it, to compare with; Newton's method finds the same in a few steps.
 
-Learning rate 0.1, times 0.8 after every 100 steps, with Adam's means begun anew; it stops where the log-likelihood
+Learning rate 0.1, times 0.8 after every 100 steps, restarting Adam's means; it stops where the log-likelihood
 changes by less than 0.01 and no entry of the gradient exceeds 0.1, or after 500 steps. (Kingma and Ba, Adam: A Method
 for Stochastic Optimization, ICLR 2015.)
 """

@@ -29,13 +29,13 @@ STEP = 0.02
 TOO_FEW = "too few demonstrations: the correction would go too far"
 
 
-def first_order_bias(evidence: Evidence, reward: Reward, told: NDArray[np.bool_]) -> FloatArray:
+def first_order_bias(evidence: Evidence, reward: Reward, free: NDArray[np.bool_]) -> FloatArray:
     """By how much a fit is expected to miss the truth on average, were this the truth.
 
     Args:
         evidence: Whole paths of demonstrations; their starts and number count, not where they lead.
         reward: The reward; k parameters.
-        told: (k,) parameters that are fitted; the others stand still.
+        free: (k,) parameters that are fitted; the others stand still.
 
     Returns:
         (k,) bias in the parameters' units, 0 for those that stand still. Within a fraction of a standard error it is
@@ -46,7 +46,7 @@ def first_order_bias(evidence: Evidence, reward: Reward, told: NDArray[np.bool_]
     """
     k = len(reward.theta)
     covariance, pairs = path_covariance(evidence, reward)
-    fitted = np.flatnonzero(told)
+    fitted = np.flatnonzero(free)
     block = np.ix_(fitted, fitted)
     inverse = np.linalg.inv(covariance[:k, :k][block])
     mixed = np.zeros((k, k, k))
@@ -72,17 +72,17 @@ def corrected(evidence: Evidence, found: Fit) -> Fit:
         raise RewardError(
             "`correct_bias`: the bias is known only at a maximum of the likelihood, without `prior` or a larger `l2`"
         )
-    told = np.isfinite(found.standard_errors)
+    free = np.isfinite(found.standard_errors)
     try:
-        bias = first_order_bias(evidence, found.reward, told)
+        bias = first_order_bias(evidence, found.reward, free)
         reward = Reward(tuple((np.array(found.reward.theta) - bias).tolist()), found.reward.terms)
         value = log_likelihood(evidence, reward)
     except RewardError as error:
         raise RewardError(f"`correct_bias`: {TOO_FEW} (beyond the bounds of the reward)") from error
     large = [
         parameter.name
-        for parameter, one, spread, tells in zip(reward.parameters, bias, found.standard_errors, told, strict=True)
-        if tells and abs(one) > spread
+        for parameter, one, spread, is_free in zip(reward.parameters, bias, found.standard_errors, free, strict=True)
+        if is_free and abs(one) > spread
     ]
     if large:
         raise RewardError(f"`correct_bias`: {TOO_FEW} (by more than a standard error in {', '.join(large)})")

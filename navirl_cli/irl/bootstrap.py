@@ -1,4 +1,4 @@
-"""How sure a fit is, by fitting again with participants drawn anew (Efron and Tibshirani 1993, Sec. 13.3)."""
+"""How sure a fit is, by fitting again with resampled participants (Efron and Tibshirani 1993, Sec. 13.3)."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -23,7 +23,7 @@ BATCH = 5
 class Bootstrap(ByContent):
     """Fits of the same number of participants, drawn with replacement."""
 
-    #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not tell one.
+    #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not identify one.
     theta: FloatArray
     #: Replicates without a fit, and those whose search did not reach a maximum (these count, as far as they came).
     failed: int
@@ -31,18 +31,18 @@ class Bootstrap(ByContent):
     seed: int
 
     @property
-    def told(self) -> IntArray:
-        """(k,) number of replicates that tell each parameter."""
+    def identified_draws(self) -> IntArray:
+        """(k,) number of replicates that identify each parameter."""
         return np.asarray(np.isfinite(self.theta).sum(axis=0))
 
     @property
     def standard_errors(self) -> FloatArray:
-        """(k,) standard deviations over the replicates that tell the parameter; NaN where fewer than two do."""
+        """(k,) standard deviations over the replicates that identify the parameter; NaN where fewer than two do."""
         columns = [column[np.isfinite(column)] for column in self.theta.T]
         return np.array([column.std(ddof=1) if len(column) > 1 else np.nan for column in columns])
 
     def interval(self, level: float = 0.95) -> FloatArray:
-        """(2, k) percentile interval over the replicates that tell the parameter; NaN where fewer than two do."""
+        """(2, k) percentile interval over the replicates that identify the parameter; NaN where fewer than two do."""
         ends = 50 * (1 - level), 50 * (1 + level)
         columns = [column[np.isfinite(column)] for column in self.theta.T]
         return np.array([np.percentile(c, ends) if len(c) > 1 else (np.nan, np.nan) for c in columns]).T

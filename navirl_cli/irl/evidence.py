@@ -116,7 +116,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
     """Collect the steps of demonstrations by scene.
 
     Raises:
-        SceneError: A demonstration's scene has no way from start to goal.
+        SceneError: A demonstration's scene has no path from start to goal.
         DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
     """
     if not demonstrations:

@@ -132,8 +132,8 @@ def fit(
         if name not in names:
             raise RewardError(unknown("fixed parameter", name, names))
     held = np.array([name in fixed for name in names])
-    # A parameter that tells nothing here may tell something there: a person at a distance, seen with another sigma_p.
-    told = np.any([objective.identified(start) for start in starts], axis=0)
+    # A parameter without effect at one start may have one at another: a distant person matters with another sigma_p.
+    effective = np.any([objective.identified(start) for start in starts], axis=0)
     steps = 0
 
     def count(value: float) -> None:
@@ -143,8 +143,8 @@ def fit(
             progress(steps, value)
 
     search = _by_adam if method is Method.ADAM else _by_newton
-    found = search(objective, starts, told & ~held, count)
-    return _as_fit(objective, found, first, told, held, (method, l2, prior))
+    found = search(objective, starts, effective & ~held, count)
+    return _as_fit(objective, found, first, effective, held, (method, l2, prior))
 
 
 def _objective(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> Objective:
@@ -163,7 +163,7 @@ def _as_fit(
     objective: Objective,
     found: Maximum,
     first: Point,
-    told: NDArray[np.bool_],
+    effective: NDArray[np.bool_],
     held: NDArray[np.bool_],
     settings: tuple[Method, float, Prior | None],
 ) -> Fit:
@@ -173,7 +173,7 @@ def _as_fit(
         objective: What was maximised.
         found: Where the search ended.
         first: The given start.
-        told: (k,) parameters that change the objective.
+        effective: (k,) parameters that change the objective.
         held: (k,) parameters that were to stay.
         settings: Method, regulariser and prior of the fit.
     """
@@ -181,9 +181,9 @@ def _as_fit(
     evidence = objective.evidence
     best, scale = found.best, objective.scale
     on_bound = ((best.x <= objective.bounds[0]) | (best.x >= objective.bounds[1])) & ~held
-    covariance, blind = uncertainty.observed(*objective.information(best), told & ~on_bound & ~held)
+    covariance, blind = uncertainty.observed(*objective.information(best), effective & ~on_bound & ~held)
     covariance *= np.outer(scale, scale)
-    reward, identified = objective.reward(best.x), told & ~blind
+    reward, identified = objective.reward(best.x), effective & ~blind
     owners = evidence.owners
     known = None if prior is None else prior.precision
     participants = [evidence.participants[owner] for owner in owners]
@@ -219,7 +219,7 @@ def _by_newton(
     """The highest maximum that is found from the starts."""
     found: list[Maximum] = []
     for start in starts:
-        # What the data do not tell stays where it was given: elsewhere the regulariser alone would choose.
+        # A parameter that the data do not identify keeps its given value. The regulariser alone would choose another.
         x = np.where(free, start.x, starts[0].x)
         begin = start if (x == start.x).all() else objective(x)
         if np.isfinite(begin.value):

@@ -1,4 +1,4 @@
-"""The free cells of a grid as a graph: who is whose neighbour, and shortest ways along it."""
+"""The free cells of a grid as a graph: who is whose neighbour, and shortest paths along it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -83,7 +83,7 @@ class Lattice:
     def _reversed(self) -> tuple[IntArray, IntArray, IntArray]:
         """The graph of reversed steps as a compressed sparse matrix: places in (n, 8) of its entries, targets, starts.
 
-        The way to a goal is the way from the goal on reversed steps; every step s -> s' has its reverse s' -> s, so
+        The path to a goal is the path from the goal on reversed steps; every step s -> s' has its reverse s' -> s, so
         that the reversed graph has the same pattern with the costs of the opposite moves.
         """
         _, move, target = self.edges
@@ -91,7 +91,7 @@ class Lattice:
         return target * 8 + OPPOSITE[move], target.astype(np.int32), starts.astype(np.int32)
 
     def costs_to(self, goal: int, cost: FloatArray) -> FloatArray:
-        """Cost of the cheapest way from every state to the goal (Dijkstra).
+        """Cost of the cheapest path from every state to the goal (Dijkstra).
 
         Args:
             goal: A state.
@@ -105,8 +105,8 @@ class Lattice:
         found: FloatArray = dijkstra(self._reversed_graph(cost), indices=goal)
         return found
 
-    def ways_to(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
-        """As :meth:`costs_to`, with the (n,) next state on each cheapest way, -1 for the goal."""
+    def cheapest_to(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
+        """As :meth:`costs_to`, with the (n,) next state on each cheapest path, -1 for the goal."""
         from scipy.sparse.csgraph import dijkstra
 
         found, following = dijkstra(self._reversed_graph(cost), indices=goal, return_predecessors=True)
@@ -120,7 +120,7 @@ class Lattice:
         return csr_array((full[places], targets, starts), shape=(self.size, self.size))
 
     def descend(self, start: int, goal: int, cost: FloatArray) -> IntArray:
-        """States along one cheapest way, start and goal included.
+        """States along one cheapest path, start and goal included.
 
         Args:
             start: A state.

@@ -71,7 +71,7 @@ def maximise(
         known: Maxima found before; the search ends, short of convergence, where it is bound for one of them.
 
     Returns:
-        The maximum and the way to it.
+        The maximum and the path to it.
     """
     lower, upper = bounds
     here, path, radius = start, [start], AGAIN_RADIUS if known else FIRST_RADIUS
@@ -93,15 +93,15 @@ def maximise(
             radius = 0.25 * float(np.linalg.norm(step))
         elif gained > 0.75 * promised and np.linalg.norm(step) > 0.8 * radius:
             radius = min(2 * radius, MAX_RADIUS)
-        # Below the rounding of the sum a gain cannot be told from noise, and a Newton step is trusted.
+        # Below the rounding of the sum a gain cannot be distinguished from noise, and a Newton step is trusted.
         noise = 1e-12 * abs(here.value)
         if gained > 0.05 * promised or (promised < noise and gained > -noise):
             here = there
             path.append(here)
             if progress is not None:
                 progress(here.value)
-    way = np.array([point.x for point in path]), np.array([point.value for point in path])
-    return Maximum(here, converged, blocked, *way)
+    history = np.array([point.x for point in path]), np.array([point.value for point in path])
+    return Maximum(here, converged, blocked, *history)
 
 
 def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
@@ -120,7 +120,7 @@ def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bo
     """A step that raises the quadratic model within region and bounds.
 
     It heads for the model's best place in the region and stops at the first bound, where it heads for the best place
-    along the bound, and so on; of the places on the way the best is taken, so that a bound never costs the ascent.
+    along the bound, and so on; the best place along it is taken, so that a bound never costs the ascent.
     """
     outward = ((here.x <= lower) & (here.gradient < 0)) | ((here.x >= upper) & (here.gradient > 0))
     moving = free & ~outward
@@ -129,13 +129,13 @@ def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bo
     while moving.any():
         gradient = here.gradient[moving] + here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
         left = np.sqrt(max(radius**2 - float(step[~moving] @ step[~moving]), 0.0))
-        way = np.zeros_like(step)
-        way[moving] = _region_step(gradient, here.hessian[np.ix_(moving, moving)], left) - step[moving]
+        direction = np.zeros_like(step)
+        direction[moving] = _region_step(gradient, here.hessian[np.ix_(moving, moving)], left) - step[moving]
         room = np.full_like(step, np.inf)
-        room[way > 0] = (high - step)[way > 0] / way[way > 0]
-        room[way < 0] = (low - step)[way < 0] / way[way < 0]
+        room[direction > 0] = (high - step)[direction > 0] / direction[direction > 0]
+        room[direction < 0] = (low - step)[direction < 0] / direction[direction < 0]
         met = room <= min(float(room.min()), 1.0)
-        step = np.where(met, np.where(way > 0, high, low), step + min(float(room.min()), 1.0) * way)
+        step = np.where(met, np.where(direction > 0, high, low), step + min(float(room.min()), 1.0) * direction)
         if _promise(here, step) > _promise(here, best):
             best = step
         if not met.any():

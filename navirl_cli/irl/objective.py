@@ -96,13 +96,13 @@ class Objective:
     def identified(self, point: Point) -> NDArray[np.bool_]:
         """(k,) which parameters change the value at all, the regulariser aside: slope or a curvature does not vanish.
 
-        Mixed curvatures count, because at a_p = 0 it is the only one that tells sigma_p.
+        Mixed curvatures count, because at a_p = 0 it is the only information on sigma_p.
         """
         information, regulariser = self.information(point)
         slope = np.abs(point.gradient - self.regulariser.gradient(point.x * self.scale) * self.scale)
         curvature = np.abs(information - regulariser).max(axis=1)
-        told: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
-        return told
+        effective: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
+        return effective
 
     def starts(self, first: Point) -> list[FloatArray]:
         """Other starts than the first: with the restarts of those parameters that have some."""

@@ -43,17 +43,17 @@ class Ordering:
         return ranks
 
     def climbs(self, parent: IntArray) -> int:
-        """How often the ways along a tree lead to a state that is farther from the goal, at most.
+        """How often the paths along a tree lead to a state that is farther from the goal, at most.
 
         Args:
-            parent: (n,) next state on the way from every state, -1 for the goal.
+            parent: (n,) next state on the path from every state, -1 for the goal.
         """
         following = np.where(parent >= 0, parent, np.arange(len(parent)))
         count = (self.rank[following] > self.rank).astype(np.int64)
         if not count.any():
             return 0
         while (following != self.goal).any():
-            count = count + count[following]  # twice as far along the way every time
+            count = count + count[following]  # twice as far along the path every time
             following = following[following]
         return int(count.max())
 

@@ -72,7 +72,7 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
         columns.append(here)
     else:
         raise RewardError(
-            f"a sampled path wandered for {limit} steps without reaching the goal: the cost of way is too low"
+            f"a sampled path wandered for {limit} steps without reaching the goal: the cost of length is too low"
         )
     states = np.stack(columns, axis=1)
     return SampledPaths(states, (states != policy.goal).sum(axis=1) + 1)

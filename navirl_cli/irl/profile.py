@@ -71,8 +71,7 @@ def profile(
         The profile.
 
     Raises:
-        RewardError: The reward has no such parameter, the demonstrations do not tell it, or a better fit was found on
-            the way.
+        RewardError: The reward has no such parameter, the data do not identify it, or a better fit was found.
     """
     j = number_of(found.reward, name)
     if found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
@@ -128,7 +127,7 @@ class _Walker:
         if relative > BETTER:
             values = ",".join(f"{p.name}={x:.6g}" for p, x in zip(reward.parameters, reward.theta, strict=True))
             raise RewardError(
-                f"`profile` {self.parameter.name}: a better fit was found on the way; fit again with `init` {values}"
+                f"`profile` {self.parameter.name}: a better fit was found; fit again with `init` {values}"
             )
         self.seen[value] = relative, reward
         if self.progress is not None:

@@ -49,7 +49,7 @@ class Scene:
             lattice: The lattice around the start, where one is known already.
 
         Raises:
-            SceneError: Start or goal is not free, or no way leads from one to the other.
+            SceneError: Start or goal is not free, or no path leads from one to the other.
         """
         lattice = Lattice.around(grid, start) if lattice is None else lattice
         first, last = (int(state) for state in lattice.states_of(np.stack([start, goal])))
@@ -68,7 +68,7 @@ class Scene:
 
     @cached_property
     def ordering(self) -> Ordering:
-        """The states by the length of their shortest 8-connected way to the goal, m."""
+        """The states by the length of their shortest 8-connected path to the goal, m."""
         lattice = self.lattice
         cheapest = np.full(lattice.size, lattice.grid.resolution_m)
         return Ordering(lattice, self.goal, lattice.costs_to(self.goal, lattice.step_m), cheapest)
@@ -93,7 +93,7 @@ class Scene:
         return deviation
 
     def nominal_line_m(self) -> FloatArray:
-        """The nominal path as a line: a shortest way, pulled straight where no obstacle is in between.
+        """The nominal path as a line: a shortest path, pulled straight where no obstacle is in between.
 
         Returns:
             (k, 2) m, map frame, from the start's centre to the goal's.
@@ -114,7 +114,7 @@ class Scene:
         xy = self.lattice.xy_m - self.lattice.xy_m[self.start]
         ahead = self.lattice.xy_m[self.goal] - self.lattice.xy_m[self.start]
         right = (xy[:, 0] * ahead[1] - xy[:, 1] * ahead[0]) / np.hypot(*ahead)
-        aside = np.abs(right) + 1e-3 * right  # of two ways that mirror each other the left one
+        aside = np.abs(right) + 1e-3 * right  # of two paths that mirror each other the left one
         # Small enough never to make a longer path the cheaper one.
         tie_break = 1e-8 * aside[:, None] * self.lattice.grid.resolution_m
         return self.lattice.descend(self.start, self.goal, self.lattice.step_m + tie_break)
@@ -131,7 +131,7 @@ class Scene:
 def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
     """The path of a planner that takes people for obstacles and knows nothing else of them.
 
-    It keeps to the straight way as long as the detour grows no longer by it, as a local planner does that meets an
+    It keeps to the straight path as long as the detour grows no longer by it, as a local planner does that meets an
     obstacle only when it is near.
 
     Args:
@@ -142,7 +142,7 @@ def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
         (k, 2) m, map frame.
 
     Raises:
-        SceneError: With the people as obstacles no way is left.
+        SceneError: With the people as obstacles no path is left.
     """
     grid = scene.lattice.grid.inflated(clearance_m, scene.people_m)
     blocked = Scene.on(grid, scene.lattice.cells[scene.start], scene.lattice.cells[scene.goal], scene.people_m)

@@ -29,7 +29,7 @@ PLAIN_SWEEPS = 300
 MAX_SWEEPS = 5000
 #: A sum that the last sweep raised by no more than this share has the right size everywhere.
 SETTLED = 0.1
-#: Steps of the Krylov method, and how often it begins anew from what it found.
+#: Steps of the Krylov method, and how often it restarts from its last result.
 KRYLOV_STEPS, CORRECTIONS = 500, 16
 #: Sweeps in which a vector is to become proof that the partition function is infinite.
 PROOF_SWEEPS = 40
@@ -47,19 +47,19 @@ class ValueStatus(StrEnum):
 
 
 class InfinitePartitionError(RewardError):
-    """The partition function is infinite, or so close to it that it cannot be told."""
+    """The partition function is infinite, or so close to infinite that this cannot be decided."""
 
     def __init__(self, status: ValueStatus) -> None:
         """Keep the status beside the message."""
         self.status = status
         super().__init__(
             f"{status.value}: a step costs so little under these parameters that endless detours outweigh the direct "
-            "way; choose a more negative c0 (on open ground below about -1.8 per cell, -18 /m on 10 cm cells) "
+            "path; choose a more negative c0 (on open ground below about -1.8 per cell, -18 /m on 10 cm cells) "
             "or a smaller positive a_p"
         )
 
     def __reduce__(self) -> tuple[type["InfinitePartitionError"], tuple[ValueStatus]]:
-        """Cross process borders with the status, from which the message is made anew."""
+        """Cross process borders with the status, from which the message is rebuilt."""
         return type(self), (self.status,)
 
 
@@ -154,7 +154,7 @@ class Splitting:
             z, accurate in every entry, and the number of sweeps it took.
 
         Raises:
-            InfinitePartitionError: There is no finite positive z, or it cannot be told or not accurately.
+            InfinitePartitionError: There is no finite positive z, or z cannot be computed accurately.
         """
         first = term = total = self.start(right)
         untried = True
@@ -229,7 +229,7 @@ class Splitting:
         # Numbers near the smallest double make norms of zero; the system is linear.
         unit = float(np.abs(lacking).max()) or 1.0
         operator = LinearOperator((len(lacking), len(lacking)), matvec=without_sweep, dtype=float)
-        # Where it breaks down or takes too long, what it found is still the better guess to begin anew from.
+        # Where it breaks down or takes too long, its last result is still the better guess to restart from.
         found, _ = bicgstab(operator, lacking / unit, rtol=accuracy, maxiter=KRYLOV_STEPS)
         step: FloatArray = found * unit
         return step

@@ -12,31 +12,31 @@ NO_INFORMATION = 1e-6
 
 
 def observed(
-    information: FloatArray, regulariser: FloatArray, told: NDArray[np.bool_]
+    information: FloatArray, regulariser: FloatArray, free: NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Covariance from the observed information, and which parameters take part in a direction that nothing tells.
+    """Covariance from the observed information, and which parameters take part in a direction without information.
 
-    Whether a direction is told is asked without what the regulariser adds, which says nothing of the world.
+    Whether a direction has information is decided without the regulariser, which holds none about people.
 
     Args:
         information: (k, k) less the Hessian of what was maximised, parameters in units of their scales.
         regulariser: (k, k) the regulariser's share of it.
-        told: (k,) parameters that are inside their bounds and change the likelihood.
+        free: (k,) parameters that are inside their bounds and change the likelihood.
 
     Returns:
         (k, k) inverse of the information where there is any, else NaN; (k,) blind parameters.
     """
     covariance = np.full(information.shape, np.nan)
-    blind = np.zeros_like(told)
-    if told.any():
-        block = np.ix_(told, told)
+    blind = np.zeros_like(free)
+    if free.any():
+        block = np.ix_(free, free)
         values, directions = np.linalg.eigh(information[block])
         plain = np.einsum("ij,ik,kj->j", directions, (information - regulariser)[block], directions)
         seen = plain > NO_INFORMATION
         found = (directions[:, seen] / values[seen]) @ directions[:, seen].T
         covariance[block] = found
         # The variance along an untold direction is at least so much; whose own is smaller than its part of it is blind.
-        blind[told] = (directions[:, ~seen] ** 2).sum(axis=1) / NO_INFORMATION > np.diag(found)
+        blind[free] = (directions[:, ~seen] ** 2).sum(axis=1) / NO_INFORMATION > np.diag(found)
         covariance[blind] = covariance[:, blind] = np.nan
     return covariance, blind
 
@@ -84,7 +84,7 @@ def correlation(covariance: FloatArray) -> FloatArray:
 
 
 def condition_number(covariance: FloatArray) -> float:
-    """Largest over least eigenvalue of the correlations: 1 for parameters told apart, large where only sums are told.
+    """Largest over smallest eigenvalue of the correlations: 1 if uncorrelated, large if only sums are identified.
 
     Of the correlations, because that of a covariance depends on the parameters' units.
     """

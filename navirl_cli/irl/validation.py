@@ -1,4 +1,4 @@
-"""How well a reward foretells people it was not learnt from: one participant after another is left out."""
+"""How well a reward predicts people that it was not learnt from: each participant is left out in turn."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -35,7 +35,7 @@ class Validation(ByContent):
     demonstrated: FloatArray
     expected: FloatArray
     deviation: FloatArray
-    #: (p, k) whether the others tell the parameter; where they do not, it stood where the fits start.
+    #: (p, k) whether the others identify the parameter; where they do not, it keeps the value at which the fits start.
     identified: NDArray[np.bool_]
     #: (p,) how the learnt model's fit to the others ended.
     statuses: tuple[Status, ...]
@@ -74,7 +74,7 @@ def cross_validate(
 ) -> Validation:
     """Learn from all participants but one and ask how likely that one's steps are; so for each.
 
-    Beside the reward stand models that must be beaten: the same without the person, the cost of way alone (the shortest
+    Baselines beside the reward: the same without the person, the cost of length alone (the shortest
     path with some noise), and equally likely moves.
 
     Args:
@@ -145,7 +145,7 @@ def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: s
     # The gradient is the difference of the sums; it varies with the paths, and with what was learnt by its derivative.
     covariance = np.nan_to_num(learnt.covariance)
     spread = found.information + found.information @ covariance @ found.information
-    # By a parameter that the others do not tell nothing is foretold.
+    # A parameter that the others do not identify predicts nothing.
     deviation = np.where(learnt.identified, np.sqrt(np.diag(spread)), np.nan)
     return _LeftOut(
         steps=held_out.steps,

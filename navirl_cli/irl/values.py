@@ -20,9 +20,9 @@ from navirl_cli.irl.series import InfinitePartitionError, Splitting, ValueStatus
 #: Steps from the goal within which z cannot leave the range of a double beside the hard value: of the moves three or
 #: four lead down, and 4^250 is e^347.
 PLAIN_STEPS = 250
-#: A block of states within which z cannot leave it beside the best way through the block.
+#: A block of states within which z cannot leave it beside the best path through the block.
 STEPS_PER_BAND = 100.0
-#: Every climb that best ways make in the order of the states costs a sweep; beyond so many a new order is cheaper.
+#: Every climb that best paths make in the order of the states costs a sweep; beyond so many a new order is cheaper.
 MAX_CLIMBS = 6
 
 
@@ -52,7 +52,7 @@ class Policy:
         return self.ordering.goal
 
     def expected_to_goal(self, reward: FloatArray) -> FloatArray:
-        """Expected sum of a per-state reward on the way to the goal: Y = (I - P)^-1 reward.
+        """Expected sum of a per-state reward on the path to the goal: Y = (I - P)^-1 reward.
 
         Args:
             reward: (n,) or (n, k); its goal row counts once.
@@ -87,7 +87,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
     """Soft values and policy of a reward.
 
     Args:
-        ordering: The states by the length of their way to the goal; where the best ways go other ways altogether, a
+        ordering: The states by the length of their path to the goal. Where the best paths take another order, a
             better order is made.
         reward: (n, 8) reward of every step by state, -inf where a move is not possible and in the goal.
 
@@ -95,7 +95,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
         The policy.
 
     Raises:
-        InfinitePartitionError: The partition function is infinite or not to be told from infinite.
+        InfinitePartitionError: The partition function is infinite, or cannot be distinguished from infinite.
     """
     lattice = ordering.lattice
     if reward.max() >= 0:
@@ -106,7 +106,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
     # goal: any positive cost will do.
     floor = 1e-3 * float(lattice.step_m.min())
     cost = np.maximum(np.where(np.isfinite(reward), -reward, 1.0), floor)
-    hard, parent = lattice.ways_to(ordering.goal, cost)
+    hard, parent = lattice.cheapest_to(ordering.goal, cost)
     large = float(ordering.distance.max()) > PLAIN_STEPS * float(lattice.step_m.min())
     if ordering.climbs(parent) > MAX_CLIMBS:
         ordering = Ordering(lattice, ordering.goal, hard, np.where(lattice.possible, cost, np.inf).min(axis=1))
@@ -140,13 +140,13 @@ def _raised(ordering: Ordering, ranked: FloatArray, hard: FloatArray, parent: In
     """A guess so near to the value that z fits a double on maps where it would not beside the hard value.
 
     One pass over the steps that lead down, band by band away from the goal. Each band's z is taken relative to the best
-    way down to the band below and on from there with the values found, so that no number leaves the range of a double.
+    path down to the band below and on from there with the values found, so that no number leaves the range of a double.
 
     Args:
         ordering: The states.
         ranked: (n, 8) reward by rank.
-        hard: (n,) value of the best way by rank.
-        parent: (n,) rank of the next state on the best way, -1 for the goal.
+        hard: (n,) value of the best path by rank.
+        parent: (n,) rank of the next state on the best path, -1 for the goal.
 
     Returns:
         (n,) by rank, between the hard value and the soft one.
@@ -176,7 +176,7 @@ def _end_of_band(ordering: Ordering, low: int) -> int:
 
 
 def _gain_on_the_way(gain: FloatArray, parent: IntArray, low: int, high: int) -> FloatArray:
-    """What was gained over the hard value where the best ways leave the band of ranks low to high downward."""
+    """What was gained over the hard value where the best paths leave the band of ranks low to high downward."""
     leaves = parent[low:high].copy()
     while (inside := (leaves >= low) & (leaves < high)).any():
         leaves[inside] = leaves[leaves[inside] - low]  # as these were moved on already, twice as far every time
@@ -203,6 +203,6 @@ def _gain_in_the_band(ordering: Ordering, ranked: FloatArray, raised: FloatArray
     z = spsolve_triangular(triangular, right, lower=True, unit_diagonal=True)
     if not np.isfinite(z).all():
         raise InfinitePartitionError(ValueStatus.UNDECIDED)
-    # Where the best way leads up first, the steps that lead down find less than it.
+    # Where the best path leads up first, the steps that lead down find less than it.
     gain: FloatArray = np.log(np.maximum(z, 1.0))
     return gain
