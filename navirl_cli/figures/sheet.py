@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
@@ -61,6 +62,7 @@ def new_figure(
         figure = plt.figure(figsize=(width_in, height_in), layout=layout)
     else:
         figure = Figure(figsize=(width_in, height_in), layout=layout)
+        FigureCanvasAgg(figure)
     grid = figure.add_gridspec(rows, columns)
     # Maps keep to the top of the room that they do not fill: taking it away then moves none of them.
     return figure, [figure.add_subplot(grid[divmod(panel, columns)], anchor="N") for panel in range(panels)]
@@ -159,7 +161,10 @@ def _boxes_in(figure: Figure) -> FloatArray:
     """(n, 4) borders x0, y0, x1, y1 of panels with their labels, of legends and of texts, inches."""
     # a legend in a free place is smaller than its hidden axes
     panels = (axes if axes.axison else axes.get_legend() for axes in figure.axes)
-    extents = (part.get_tightbbox() for part in (*panels, *figure.legends, *figure.texts) if part is not None)
+    # without a renderer handed in, matplotlib makes one for every part
+    canvas = figure.canvas
+    renderer = canvas.get_renderer() if isinstance(canvas, FigureCanvasAgg) else None  # type: ignore[no-untyped-call]
+    extents = (part.get_tightbbox(renderer) for part in (*panels, *figure.legends, *figure.texts) if part is not None)
     boxes: FloatArray = np.array([extent.extents for extent in extents if extent is not None]).reshape(-1, 4)
     return boxes / figure.dpi
 
