@@ -176,9 +176,9 @@ def test_draws_that_do_not_tell_a_parameter_say_nothing_of_it():
     ]
     evidence = evidence_of(demonstrations)
     found = bootstrap(evidence, fit(evidence, START), 12, 0, executor=Here())
-    assert found.told[0] == len(found.theta) == 12
-    assert 0 < found.told[2] < 12
-    assert np.isnan(found.theta[:, 2]).sum() == 12 - found.told[2]
+    assert found.identified_draws[0] == len(found.theta) == 12
+    assert 0 < found.identified_draws[2] < 12
+    assert np.isnan(found.theta[:, 2]).sum() == 12 - found.identified_draws[2]
     told = found.theta[np.isfinite(found.theta[:, 2]), 2]
     assert found.standard_errors[2] == pytest.approx(told.std(ddof=1))
     assert found.interval()[:, 2] == pytest.approx(np.percentile(told, [2.5, 97.5]))

@@ -20,7 +20,7 @@ def bootstrap_document(found: "Bootstrap") -> dict[str, Any]:
     return {
         "seed": found.seed,
         "failed": found.failed,
-        "identified_draws": found.told.tolist(),
+        "identified_draws": found.identified_draws.tolist(),
         "stopped_early": found.stopped_early,
         "standard_errors": numbers(found.standard_errors),
         "lower": numbers(lower),

@@ -1,4 +1,4 @@
-"""How sure a fit is, by fitting again with participants drawn anew (Efron and Tibshirani 1993, Sec. 13.3)."""
+"""Uncertainty of a fit by fits to participants drawn with replacement (Efron and Tibshirani 1993, Sec. 13.3)."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -23,26 +23,27 @@ BATCH = 5
 class Bootstrap(ByContent):
     """Fits of the same number of participants, drawn with replacement."""
 
-    #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not tell one.
+    #: (replicates, k) parameters of the replicates that gave a fit; NaN where the drawn participants do not identify a
+    #: parameter.
     theta: FloatArray
-    #: Replicates without a fit, and those whose search did not reach a maximum (these count, as far as they came).
+    #: Number of replicates without a fit, and of those whose search did not reach a maximum (their last values count).
     failed: int
     stopped_early: int
     seed: int
 
     @property
-    def told(self) -> IntArray:
-        """(k,) number of replicates that tell each parameter."""
+    def identified_draws(self) -> IntArray:
+        """(k,) number of replicates that identify each parameter."""
         return np.asarray(np.isfinite(self.theta).sum(axis=0))
 
     @property
     def standard_errors(self) -> FloatArray:
-        """(k,) standard deviations over the replicates that tell the parameter; NaN where fewer than two do."""
+        """(k,) standard deviations over the replicates that identify the parameter; NaN where fewer than two do."""
         columns = [column[np.isfinite(column)] for column in self.theta.T]
         return np.array([column.std(ddof=1) if len(column) > 1 else np.nan for column in columns])
 
     def interval(self, level: float = 0.95) -> FloatArray:
-        """(2, k) percentile interval over the replicates that tell the parameter; NaN where fewer than two do."""
+        """(2, k) percentile interval over the replicates that identify the parameter; NaN where fewer than two do."""
         ends = 50 * (1 - level), 50 * (1 + level)
         columns = [column[np.isfinite(column)] for column in self.theta.T]
         return np.array([np.percentile(c, ends) if len(c) > 1 else (np.nan, np.nan) for c in columns]).T
@@ -57,13 +58,13 @@ def bootstrap(
     executor: Executor | None = None,
     progress: Callable[[int, str], None] | None = None,
 ) -> Bootstrap:
-    """Fit again with participants drawn with replacement; all demonstrations of one come together.
+    """Fit again to participants drawn with replacement; all demonstrations of a participant are drawn together.
 
     Args:
-        evidence: What was learnt from.
-        found: The fit of it; every replicate starts there, with its prior and regulariser.
+        evidence: The demonstrated steps of the fit.
+        found: The fit. Every replicate starts there and has the same prior and regulariser.
         count: Number of replicates.
-        seed: Of the draws.
+        seed: Seed of the draws.
         executor: Where to compute; by default local processes.
         progress: Called with the number of replicates done.
 
