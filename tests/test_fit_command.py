@@ -309,11 +309,11 @@ def test_what_is_read_is_not_replaced(navirl, files):
 
 def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monkeypatch):
     def nothing(*_args, **_options):
-        raise RewardError("`profile` a_p: a better fit was found")
+        raise RewardError("`profile` a_p: the profile found a better fit")
 
     monkeypatch.setattr("navirl_cli.irl.analyses.profile", nothing)
     told = navirl("fit", files / "one.json", "-o", "r.json", "--profile", "a_p", code=3)
-    assert told.stderr.endswith("navirl: --profile a_p: a better fit was found\n")
+    assert told.stderr.endswith("navirl: --profile a_p: the profile found a better fit\n")
     assert read_reward(Path("r.json")).profiles == ()
 
 
@@ -346,7 +346,7 @@ def test_a_bias_too_large_to_be_taken_off_leaves_the_fit_as_it_is(navirl, files)
     one = read_demonstrations(files / "demos.json")[:1]
     write_json(Path("single.json"), "demonstrations", demonstrations_document(one, [], {}), force=False)
     told = navirl("fit", "single.json", "-o", "r.json", "--correct-bias", code=3).stderr
-    assert "navirl: --correct-bias: too few demonstrations: the correction would go too far" in told
+    assert "navirl: --correct-bias: too few demonstrations: a first-order correction is not valid" in told
     assert values_of(read_json(Path("r.json"), "reward"), "bias_subtracted") == [None] * 4
 
 

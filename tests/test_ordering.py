@@ -29,7 +29,7 @@ def test_climbs_against_a_walk_from_every_state(seed):
     scene = make.random_scene(rng, 14, 11, density=(0.0, 0.25)[seed % 2])
     lattice = scene.lattice
     cost = rng.gamma(0.3, size=(lattice.size, 1)) + 0.01 * lattice.step_m
-    _, parent = lattice.cheapest_to(scene.goal, cost)
+    _, parent = lattice.cheapest_tree(scene.goal, cost)
     slow = slow_climbs(scene.ordering, parent)
     assert slow > 1, "costs so uneven send ways up and down"
     assert scene.ordering.climbs(parent) == slow
@@ -37,7 +37,7 @@ def test_climbs_against_a_walk_from_every_state(seed):
 
 def test_ways_that_only_descend_do_not_climb():
     scene = make.random_scene(np.random.default_rng(3), 14, 11, density=0.2)
-    _, parent = scene.lattice.cheapest_to(scene.goal, scene.lattice.step_m)
+    _, parent = scene.lattice.cheapest_tree(scene.goal, scene.lattice.step_m)
     assert scene.ordering.climbs(parent) == 0
 
 
@@ -96,7 +96,9 @@ def test_where_the_best_way_leads_off_first_another_order_is_made_and_values_are
         monkeypatch.setattr(values, "PLAIN_STEPS", 1)
         monkeypatch.setattr(values, "STEPS_PER_BAND", 5.0)
     scene, reward = world()
-    hard, parent = scene.lattice.cheapest_to(scene.goal, np.where(scene.lattice.possible, -reward.on(scene).value, 1.0))
+    hard, parent = scene.lattice.cheapest_tree(
+        scene.goal, np.where(scene.lattice.possible, -reward.on(scene).value, 1.0)
+    )
     assert scene.ordering.climbs(parent) > values.MAX_CLIMBS
     policy = policy_of(reward, scene)
     assert made == [policy.ordering]

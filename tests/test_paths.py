@@ -80,5 +80,5 @@ def test_a_hard_policy_drives_the_only_shortest_path():
 def test_a_path_that_wanders_on_and_on_is_given_up(monkeypatch):
     monkeypatch.setattr(paths, "PATIENCE", 0)
     corridor = make.scene_on(make.open_grid(150, 1), [0, 0], [149, 0])
-    with pytest.raises(RewardError, match="a sampled path wandered for 100 steps without reaching the goal"):
+    with pytest.raises(RewardError, match="a sampled path did not reach the goal within 100 steps"):
         sample_paths(policy_of(Reward((-30.0, 0.0, 0.0, 1.0)), corridor), corridor.start, 2, np.random.default_rng(0))

@@ -165,7 +165,7 @@ def test_a_better_fit_on_the_way_is_said_with_the_way_there(evidence, found):
     # A fit that is none: its objective is lower than what the others reach without it.
     theta = (found.reward.theta[0] - 8.0, *found.reward.theta[1:])
     fake = replace(found, reward=Reward(theta), objective=log_likelihood(evidence, Reward(theta)))
-    with pytest.raises(RewardError, match=r"`profile` c0: a better fit was found; fit again with `init` c0=-"):
+    with pytest.raises(RewardError, match=r"`profile` c0: the profile found a better fit; fit again with `init` c0=-"):
         profile(evidence, fake, "c0")
 
 

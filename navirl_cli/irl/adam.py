@@ -1,8 +1,10 @@
-"""Gradient ascent by Adam as the paper's study ran it, to compare with; Newton's method finds the same in a few steps.
+"""Gradient ascent by Adam as in the paper's study, for comparison.
 
-Learning rate 0.1, times 0.8 after every 100 steps, restarting Adam's means; it stops where the log-likelihood
-changes by less than 0.01 and no entry of the gradient exceeds 0.1, or after 500 steps. (Kingma and Ba, Adam: A Method
-for Stochastic Optimization, ICLR 2015.)
+Newton's method finds the same maximum in a few steps.
+
+Learning rate 0.1, times 0.8 after every 100 steps, and Adam's means start again from zero then. It stops where the
+log-likelihood changes by less than 0.01 and no entry of the gradient exceeds 0.1, or after 500 steps.
+(Kingma and Ba, Adam: A Method for Stochastic Optimization, ICLR 2015.)
 """
 
 from collections.abc import Callable
@@ -62,7 +64,7 @@ def ascend(
         values.append(value)
         if progress is not None:
             progress(value)
-        # What pushes against a bound will not vanish.
+        # The gradient does not vanish where it points across a bound.
         outward = ((x <= bounds[0]) & (gradient < 0)) | ((x >= bounds[1]) & (gradient > 0))
         slope = float(np.abs(gradient[free & ~outward]).max(initial=0.0))
         if abs(values[-1] - values[-2]) < VALUE_TOLERANCE and slope < GRADIENT_TOLERANCE:

@@ -1,4 +1,4 @@
-"""What a fit is asked besides its parameters: bias, bootstrap, profiles, prediction of people left out."""
+"""Analyses of a fit: bias, bootstrap, profile likelihoods, prediction of left-out participants."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
@@ -15,7 +15,7 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
 from navirl_cli.irl.validation import Validation, cross_validate
 
-#: Called with the steps done and a word on the present one.
+#: Called with the number of steps done and a short text on the present one.
 Update = Callable[[int, str], None]
 #: Opens a progress bar: a label, and the number of steps where it is known.
 Bars = Callable[[str, int | None], AbstractContextManager[Update]]
@@ -23,7 +23,7 @@ Bars = Callable[[str, int | None], AbstractContextManager[Update]]
 
 @dataclass(frozen=True)
 class Questions:
-    """What is asked of a fit."""
+    """The analyses requested of a fit."""
 
     #: Subtract the first-order bias of maximum likelihood.
     correct_bias: bool = False
@@ -33,14 +33,14 @@ class Questions:
     profiles: tuple[str, ...] = ()
     #: Predict each participant from the others.
     cross_validate: bool = False
-    #: Of the bootstrap's draws.
+    #: Seed of the bootstrap's draws.
     seed: int = 0
 
     def check_arguments(self, steps: Steps, *, prior: bool, l2: float) -> None:
-        """Refuse before anything is read what cannot be asked of any data.
+        """Refuse requests that no data can answer, before anything is read.
 
         Raises:
-            ArgumentError: The questions exclude each other, the prior, the steps or the regulariser.
+            ArgumentError: The analyses exclude each other, the prior, the steps or the regulariser.
         """
         if self.cross_validate and prior:
             raise ArgumentError(
@@ -59,7 +59,7 @@ class Questions:
             )
 
     def check(self, evidence: Evidence, start: Reward) -> None:
-        """Refuse before a fit what these data cannot answer after it.
+        """Refuse requests that these data cannot answer, before the fit.
 
         Raises:
             RewardError: A parameter is unknown.
@@ -74,7 +74,7 @@ class Questions:
 
 @dataclass(frozen=True)
 class Analyses:
-    """Answers."""
+    """The results of the analyses."""
 
     bootstrap: Bootstrap | None = None
     profiles: tuple[Profile, ...] = ()
@@ -94,18 +94,18 @@ def answers(
     executor: Executor | None = None,
     bars: Bars = no_bars,
 ) -> tuple[Fit, Analyses, list[str]]:
-    """Ask a fit.
+    """Run the requested analyses of a fit.
 
     Args:
-        evidence: What was learnt from.
-        found: The fit of it.
-        questions: What is asked.
+        evidence: The demonstrated steps of the fit.
+        found: The fit.
+        questions: The requested analyses.
         executor: Where to compute; by default local processes.
-        bars: Opens a progress bar for each question.
+        bars: Opens a progress bar for each analysis.
 
     Returns:
-        The fit, corrected where that was asked; the answers; and why a question has no answer. The fit stands whatever
-        becomes of a question.
+        The fit, corrected if requested; the results; and the errors of analyses that failed. A failed analysis does not
+        affect the fit.
     """
     lost: list[str] = []
     drawn = validation = None
@@ -127,7 +127,7 @@ def answers(
 
 @contextmanager
 def _kept(lost: list[str]) -> Iterator[None]:
-    """Keep an expected error of one question from the fit and from the other questions."""
+    """Collect an expected error of one analysis, so that it ends neither the fit nor the other analyses."""
     try:
         yield
     except NavirlError as error:

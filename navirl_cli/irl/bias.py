@@ -1,13 +1,14 @@
-"""The bias that maximum likelihood has with few demonstrations, to first order in one over their number.
+"""The bias of maximum likelihood with few demonstrations, to first order in 1 / number of demonstrations.
 
 D. R. Cox, E. J. Snell, A general definition of residuals, Journal of the Royal Statistical Society B 30 (1968), Sec. 3,
 as G. M. Cordeiro and R. Klein write it (Statistics and Probability Letters 19, 1994):
 
     bias_s = 1/2 sum_ijk I^si I^jk (kappa_ij,k - dI_ij/dtheta_k),
 
-with I the expected information, I^ij its inverse, and kappa_ij,k the mean of second derivative times first of the
-log-likelihood. A path's log-likelihood is its reward less a function of the parameters, so that kappa_ij,k is the
-covariance of d2r/dij and dr/dk summed along paths, of the same form as I and as exactly known.
+with I the expected information, I^ij its inverse, and kappa_ij,k the mean of the product of the second derivative (ij)
+and the first (k) of the log-likelihood. A path's log-likelihood is its reward minus a function of the parameters.
+Therefore kappa_ij,k is the covariance of d2r/dij and dr/dk summed along paths. It has the form of I and is computed as
+exactly.
 """
 
 from dataclasses import replace
@@ -26,27 +27,27 @@ from navirl_cli.irl.status import Status
 
 #: Step of the difference quotients of I, in standard errors.
 STEP = 0.02
-TOO_FEW = "too few demonstrations: the correction would go too far"
+TOO_FEW = "too few demonstrations: a first-order correction is not valid"
 
 
-def first_order_bias(evidence: Evidence, reward: Reward, free: NDArray[np.bool_]) -> FloatArray:
-    """By how much a fit is expected to miss the truth on average, were this the truth.
+def first_order_bias(evidence: Evidence, reward: Reward, identified: NDArray[np.bool_]) -> FloatArray:
+    """Expected difference between a fit and the true reward, if this were the true reward.
 
     Args:
-        evidence: Whole paths of demonstrations; their starts and number count, not where they lead.
+        evidence: Whole paths of demonstrations. Only their number and their starts matter.
         reward: The reward; k parameters.
-        free: (k,) parameters that are fitted; the others stand still.
+        identified: (k,) parameters that are fitted; the others are constant.
 
     Returns:
-        (k,) bias in the parameters' units, 0 for those that stand still. Within a fraction of a standard error it is
-        what a fit should be corrected by; where it exceeds one, the demonstrations are too few for it.
+        (k,) bias in the parameters' units, 0 for constant parameters. A fit can be corrected by it where it is a
+        fraction of a standard error. Where it exceeds one, the demonstrations are too few.
 
     Raises:
         InfinitePartitionError: The partition function is infinite at the reward or close to it.
     """
     k = len(reward.theta)
     covariance, pairs = path_covariance(evidence, reward)
-    fitted = np.flatnonzero(free)
+    fitted = np.flatnonzero(identified)
     block = np.ix_(fitted, fitted)
     inverse = np.linalg.inv(covariance[:k, :k][block])
     mixed = np.zeros((k, k, k))
@@ -62,27 +63,29 @@ def first_order_bias(evidence: Evidence, reward: Reward, free: NDArray[np.bool_]
 
 
 def corrected(evidence: Evidence, found: Fit) -> Fit:
-    """A fit to whole paths less its own bias; errors are those of the fit.
+    """A fit to whole paths minus its bias; the standard errors are those of the fit.
 
     Raises:
-        RewardError: The fit is not at a maximum of the likelihood, or its bias exceeds a standard error, so that the
+        RewardError: The fit is not at a maximum of the likelihood, or its bias exceeds a standard error. Then the
             demonstrations are too few for a correction to first order.
     """
     if found.prior is not None or found.l2 > PAPER_L2 or found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
         raise RewardError(
             "`correct_bias`: the bias is known only at a maximum of the likelihood, without `prior` or a larger `l2`"
         )
-    free = np.isfinite(found.standard_errors)
+    identified = np.isfinite(found.standard_errors)
     try:
-        bias = first_order_bias(evidence, found.reward, free)
+        bias = first_order_bias(evidence, found.reward, identified)
         reward = Reward(tuple((np.array(found.reward.theta) - bias).tolist()), found.reward.terms)
         value = log_likelihood(evidence, reward)
     except RewardError as error:
         raise RewardError(f"`correct_bias`: {TOO_FEW} (beyond the bounds of the reward)") from error
     large = [
         parameter.name
-        for parameter, one, spread, is_free in zip(reward.parameters, bias, found.standard_errors, free, strict=True)
-        if is_free and abs(one) > spread
+        for parameter, one, spread, fitted_here in zip(
+            reward.parameters, bias, found.standard_errors, identified, strict=True
+        )
+        if fitted_here and abs(one) > spread
     ]
     if large:
         raise RewardError(f"`correct_bias`: {TOO_FEW} (by more than a standard error in {', '.join(large)})")
@@ -91,7 +94,7 @@ def corrected(evidence: Evidence, found: Fit) -> Fit:
 
 
 def _information_slope(evidence: Evidence, reward: Reward, number: int, step: float) -> FloatArray:
-    """(k, k) derivative of the expected information by one parameter, from the inside of its bounds."""
+    """(k, k) derivative of the expected information by one parameter, by a difference quotient within its bounds."""
     parameter, here = reward.parameters[number], reward.theta[number]
     ends = max(here - step, parameter.lower), min(here + step, parameter.upper)
     k = len(reward.theta)

@@ -1,4 +1,4 @@
-"""How sure a fit is, by fitting again with resampled participants (Efron and Tibshirani 1993, Sec. 13.3)."""
+"""Uncertainty of a fit by fits to participants drawn with replacement (Efron and Tibshirani 1993, Sec. 13.3)."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -23,9 +23,10 @@ BATCH = 5
 class Bootstrap(ByContent):
     """Fits of the same number of participants, drawn with replacement."""
 
-    #: (replicates, k) parameters of those that gave a fit; NaN where the drawn participants do not identify one.
+    #: (replicates, k) parameters of the replicates that gave a fit; NaN where the drawn participants do not identify a
+    #: parameter.
     theta: FloatArray
-    #: Replicates without a fit, and those whose search did not reach a maximum (these count, as far as they came).
+    #: Number of replicates without a fit, and of those whose search did not reach a maximum (their last values count).
     failed: int
     stopped_early: int
     seed: int
@@ -57,13 +58,13 @@ def bootstrap(
     executor: Executor | None = None,
     progress: Callable[[int, str], None] | None = None,
 ) -> Bootstrap:
-    """Fit again with participants drawn with replacement; all demonstrations of one come together.
+    """Fit again to participants drawn with replacement; all demonstrations of a participant are drawn together.
 
     Args:
-        evidence: What was learnt from.
-        found: The fit of it; every replicate starts there, with its prior and regulariser.
+        evidence: The demonstrated steps of the fit.
+        found: The fit. Every replicate starts there and has the same prior and regulariser.
         count: Number of replicates.
-        seed: Of the draws.
+        seed: Seed of the draws.
         executor: Where to compute; by default local processes.
         progress: Called with the number of replicates done.
 

@@ -1,4 +1,4 @@
-"""What is learnt from: the demonstrated steps, by scene."""
+"""The demonstrated steps that a reward is learnt from, by scene."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -39,10 +39,10 @@ class SceneEvidence:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Demonstrated steps, by scene; repeated steps count each time."""
+    """Demonstrated steps, by scene. A step that is repeated counts each time."""
 
     scenes: tuple[SceneEvidence, ...]
-    #: By demonstration, also of those none of whose steps is left.
+    #: By demonstration, including those without a selected step.
     participants: tuple[str, ...]
 
     @property
@@ -57,19 +57,19 @@ class Evidence:
 
     @property
     def owners(self) -> IntArray:
-        """Numbers of the demonstrations of which there is a step."""
+        """Numbers of the demonstrations with at least one step."""
         return np.unique(np.concatenate([part.owner for part in self.scenes]))
 
     @property
     def people(self) -> list[str]:
-        """Participants of whose demonstrations there is a step, in order of their names."""
+        """Participants with at least one step, sorted by name."""
         return sorted({self.participants[owner] for owner in self.owners})
 
     def several_people(self, argument: str) -> list[str]:
-        """The participants, where there are several.
+        """The participants; an error if there is only one.
 
         Args:
-            argument: The name of what needs several, for the message.
+            argument: Name of the argument that needs several participants, for the message.
 
         Raises:
             DemonstrationError: There is only one.
@@ -94,7 +94,7 @@ class Evidence:
         return self._of(part.taken(chosen[starts[part.owner] + part.number]) for part in self.scenes)
 
     def repeated(self, counts: IntArray) -> "Evidence":
-        """All steps of every demonstration as often as a (demonstrations,) count says; owners keep their numbers.
+        """The steps of every demonstration, repeated (demonstrations,) count times; demonstrations keep their numbers.
 
         Raises:
             DemonstrationError: No step is left.
@@ -117,7 +117,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
 
     Raises:
         SceneError: A demonstration's scene has no path from start to goal.
-        DemonstrationError: A demonstration's path enters its goal before its end, or there is none.
+        DemonstrationError: A demonstration's path enters its goal before its end, or there are no demonstrations.
     """
     if not demonstrations:
         raise DemonstrationError("no demonstration to learn from")

@@ -19,12 +19,12 @@ from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
 
-#: The paper's small regulariser: its code decays theta by 0.001 theta a gradient, in cell units.
+#: The paper's small regulariser: its code subtracts 0.001 theta per gradient step, in cell units.
 PAPER_L2 = 1e-3
 
 
 class Method(StrEnum):
-    """How the maximum is searched."""
+    """Search method."""
 
     NEWTON = "newton"
     ADAM = "adam"
@@ -32,10 +32,11 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Fit(ByContent):
-    """A learnt reward and how sure it is."""
+    """A learnt reward and its uncertainty."""
 
     reward: Reward
-    #: (k, k) inverse of the observed information, in the parameters' units; NaN where there is none.
+    #: (k, k) inverse of the observed information, in the parameters' units; NaN where the data do not identify a
+    #: parameter.
     covariance: FloatArray
     #: (k, k) sandwich covariance clustered by participant; None for a single participant.
     clustered: FloatArray | None
@@ -45,7 +46,7 @@ class Fit(ByContent):
     on_bound: NDArray[np.bool_]
     #: Log-likelihoods in nats: of the fit, of the start, and of equally likely moves.
     log_likelihood: float
-    #: What was maximised: the log-likelihood with regulariser and prior.
+    #: The maximised objective: log-likelihood plus regulariser and log prior density.
     objective: float
     log_likelihood_initial: float
     log_likelihood_uniform: float
@@ -61,7 +62,7 @@ class Fit(ByContent):
     #: Accepted points of the search that found the maximum: (iterations, k) parameters, (iterations,) log-likelihood.
     path_theta: FloatArray
     path_log_likelihood: FloatArray
-    #: (k,) bias that was subtracted, in the parameters' units; None where none was.
+    #: (k,) bias that was subtracted, in the parameters' units; None without a correction.
     bias: FloatArray | None = None
 
     @property
@@ -107,10 +108,10 @@ def fit(
         evidence: Demonstrated steps.
         initial: Where to start.
         l2: Weight of the regulariser, nats per squared scale (the scales: 10 /m for c0, 1 for the others); it acts on
-            parameters of which the prior knows nothing.
-        prior: What is known besides, in the parameters' units.
+            the parameters that the prior does not contain.
+        prior: Gaussian prior, in the parameters' units.
         method: Trust-region Newton from two starts, or the study's gradient ascent from one.
-        fixed: Names of parameters that stay where they start.
+        fixed: Names of parameters that keep their initial values.
         restarts: Whether Newton's method tries the parameters' other starts too.
         progress: Called with the number of accepted steps so far and the objective.
 
@@ -132,8 +133,8 @@ def fit(
         if name not in names:
             raise RewardError(unknown("fixed parameter", name, names))
     held = np.array([name in fixed for name in names])
-    # A parameter without effect at one start may have one at another: a distant person matters with another sigma_p.
-    effective = np.any([objective.identified(start) for start in starts], axis=0)
+    # A parameter may change the likelihood from one start only: a distant person matters for a small sigma_p alone.
+    influential = np.any([objective.identified(start) for start in starts], axis=0)
     steps = 0
 
     def count(value: float) -> None:
@@ -143,12 +144,12 @@ def fit(
             progress(steps, value)
 
     search = _by_adam if method is Method.ADAM else _by_newton
-    found = search(objective, starts, effective & ~held, count)
-    return _as_fit(objective, found, first, effective, held, (method, l2, prior))
+    found = search(objective, starts, influential & ~held, count)
+    return _as_fit(objective, found, first, influential, held, (method, l2, prior))
 
 
 def _objective(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> Objective:
-    """What is maximised."""
+    """The objective of a fit."""
     regulariser = Prior.l2(initial.parameters, l2)
     if prior is None:
         return Objective(evidence, initial, regulariser, regulariser)
@@ -163,27 +164,27 @@ def _as_fit(
     objective: Objective,
     found: Maximum,
     first: Point,
-    effective: NDArray[np.bool_],
+    influential: NDArray[np.bool_],
     held: NDArray[np.bool_],
     settings: tuple[Method, float, Prior | None],
 ) -> Fit:
     """Uncertainty and status at a maximum.
 
     Args:
-        objective: What was maximised.
+        objective: The maximised objective.
         found: Where the search ended.
-        first: The given start.
-        effective: (k,) parameters that change the objective.
-        held: (k,) parameters that were to stay.
+        first: The objective at the given start.
+        influential: (k,) parameters that change the objective.
+        held: (k,) fixed parameters.
         settings: Method, regulariser and prior of the fit.
     """
     method, l2, prior = settings
     evidence = objective.evidence
     best, scale = found.best, objective.scale
     on_bound = ((best.x <= objective.bounds[0]) | (best.x >= objective.bounds[1])) & ~held
-    covariance, blind = uncertainty.observed(*objective.information(best), effective & ~on_bound & ~held)
+    covariance, blind = uncertainty.observed(*objective.information(best), influential & ~on_bound & ~held)
     covariance *= np.outer(scale, scale)
-    reward, identified = objective.reward(best.x), effective & ~blind
+    reward, identified = objective.reward(best.x), influential & ~blind
     owners = evidence.owners
     known = None if prior is None else prior.precision
     participants = [evidence.participants[owner] for owner in owners]
@@ -216,19 +217,19 @@ def _as_fit(
 def _by_newton(
     objective: Objective, starts: Sequence[Point], free: NDArray[np.bool_], count: Callable[[float], None]
 ) -> Maximum:
-    """The highest maximum that is found from the starts."""
+    """The highest maximum found from the starts."""
     found: list[Maximum] = []
     for start in starts:
-        # A parameter that the data do not identify keeps its given value. The regulariser alone would choose another.
+        # Parameters that the data do not identify keep their initial values: the regulariser alone would move them.
         x = np.where(free, start.x, starts[0].x)
         begin = start if (x == start.x).all() else objective(x)
         if np.isfinite(begin.value):
             tops = [maximum.best for maximum in found if maximum.converged]
             climb = maximise(objective, begin, objective.bounds, free, count, tops)
             if any(climb.best.value > top.value for top in tops) and not climb.converged:
-                climb = maximise(objective, climb.best, objective.bounds, free, count)  # it was bound for another one
+                climb = maximise(objective, climb.best, objective.bounds, free, count)  # to another maximum
             found.append(climb)
-    # Of maxima that differ by rounding the first: that of the given start.
+    # Of maxima that differ by rounding only, take that of the given start.
     top = max(maximum.best.value for maximum in found)
     return next(maximum for maximum in found if maximum.best.value >= top - 1e-9)
 
@@ -242,7 +243,7 @@ def _by_adam(
 
 
 def _status(found: Maximum, identified: NDArray[np.bool_], on_bound: NDArray[np.bool_]) -> Status:
-    """How it ended, the worst first."""
+    """The worst status that applies."""
     if not found.converged:
         return Status.INFINITE if found.blocked else Status.STOPPED_EARLY
     if not identified.all():

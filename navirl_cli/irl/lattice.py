@@ -1,4 +1,4 @@
-"""The free cells of a grid as a graph: who is whose neighbour, and shortest paths along it."""
+"""The free cells of a grid as a graph: neighbours and shortest paths."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +19,7 @@ class Lattice:
     grid: Grid
     #: (n, 2) column and row of every state.
     cells: IntArray
-    #: (rows, columns) number of the state, -1 where there is none.
+    #: (rows, columns) number of the state, -1 where the cell is no state.
     index: IntArray
     #: (n, 8) the state that each move leads to, -1 where the move is not possible.
     neighbours: IntArray
@@ -83,8 +83,8 @@ class Lattice:
     def _reversed(self) -> tuple[IntArray, IntArray, IntArray]:
         """The graph of reversed steps as a compressed sparse matrix: places in (n, 8) of its entries, targets, starts.
 
-        The path to a goal is the path from the goal on reversed steps; every step s -> s' has its reverse s' -> s, so
-        that the reversed graph has the same pattern with the costs of the opposite moves.
+        A path to the goal is a path from the goal along reversed steps. Every step s -> s' has its reverse s' -> s. The
+        reversed graph therefore has the same pattern, with the costs of the opposite moves.
         """
         _, move, target = self.edges
         starts = np.concatenate([[0], np.cumsum(self.possible.sum(axis=1))])
@@ -105,7 +105,7 @@ class Lattice:
         found: FloatArray = dijkstra(self._reversed_graph(cost), indices=goal)
         return found
 
-    def cheapest_to(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
+    def cheapest_tree(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
         """As :meth:`costs_to`, with the (n,) next state on each cheapest path, -1 for the goal."""
         from scipy.sparse.csgraph import dijkstra
 

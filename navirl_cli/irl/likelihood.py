@@ -1,9 +1,10 @@
-"""How likely the demonstrated steps are under a reward, with exact gradient and Hessian.
+"""Likelihood of the demonstrated steps under a reward, with exact gradient and Hessian.
 
-log p(a|s) = r(s, a) + V(s') - V(s), so that with the soft value's derivative Y_j(s) = dV(s)/dtheta_j, the expected sum
-of f_j = dr/dtheta_j from s to the goal, the gradient of a step is f_j(s, a) + Y_j(s') - Y_j(s) (Eq. 6 step by step).
-Over the steps of a path the values telescope to R - V(start). The Hessian needs the second derivative of V weighted by
-the net flow w of the steps (out of a state minus into it), which is one solve with the transposed policy:
+log p(a|s) = r(s, a) + V(s') - V(s). Let Y_j(s) = dV(s)/dtheta_j be the derivative of the soft value, which is the
+expected sum of f_j = dr/dtheta_j from s to the goal. The gradient of a step is f_j(s, a) + Y_j(s') - Y_j(s) (Eq. 6 step
+by step). Over the steps of a path the values telescope to R - V(start).
+The Hessian needs the second derivative of V, weighted by the net flow w of the steps (out of a state minus into it).
+This is one solve with the transposed policy:
 
     sum_s w(s) d2V(s) = sum_s D_w(s) ( Cov_a[f_j + Y_j(s'), f_k + Y_k(s')] + E_a[d2r/dj dk] ),  D_w = (I - P^T)^-1 w.
 """
@@ -68,7 +69,7 @@ def log_likelihood(evidence: Evidence, reward: Reward) -> float:
 
 
 def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, FloatArray]:
-    """Log-likelihood and (k,) gradient at the least cost: one solve for the value and one for the visits.
+    """Log-likelihood and (k,) gradient at the lowest cost: one solve for the value and one for the visits.
 
     Raises:
         InfinitePartitionError: The partition function is infinite in one of the scenes.
@@ -132,7 +133,7 @@ def path_covariance(evidence: Evidence, reward: Reward) -> tuple[FloatArray, lis
     """Covariance of sums along whole paths, if the reward were true, summed over the demonstrations.
 
     Args:
-        evidence: Gives scenes, and how many paths start where.
+        evidence: Gives the scenes and the number of paths from each start.
         reward: The reward; k parameters.
 
     Returns:
@@ -187,7 +188,7 @@ def _step_gradients(part: SceneEvidence, jet: Jet, slope: FloatArray) -> FloatAr
 
 
 def _flow(part: SceneEvidence, policy: Policy) -> FloatArray:
-    """(n,) visits that start wherever the steps leave more often than they enter: D_w."""
+    """(n,) visits D_w from the net flow w: a state is left w times more often than it is entered."""
     size = part.scene.lattice.size
     net = np.bincount(part.state, minlength=size) - np.bincount(part.target, minlength=size)
     net[part.scene.goal] = 0  # the goal's value is zero whatever the parameters
@@ -195,7 +196,7 @@ def _flow(part: SceneEvidence, policy: Policy) -> FloatArray:
 
 
 def _curvature(part: SceneEvidence, jet: Jet, policy: Policy, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k, k) covariance of the steps' gradient, and what the bend of the terms adds to the Hessian less of it."""
+    """(k, k) covariance of the steps' gradient, and the part of the Hessian from the terms' second derivatives."""
     weight = policy.probability * _flow(part, policy)[:, None]
     expected = _covariance(jet.first, policy, slope, weight)
     bend = np.zeros_like(expected)
@@ -206,7 +207,7 @@ def _curvature(part: SceneEvidence, jet: Jet, policy: Policy, slope: FloatArray)
 
 
 def _covariance(features: Sequence[FloatArray], policy: Policy, slope: FloatArray, weight: FloatArray) -> FloatArray:
-    """(k, k) sum over states and moves of weight times what the move changes of the features' expected sums.
+    """(k, k) weighted sum, over states and moves, of products of a move's changes of the expected feature sums.
 
     Args:
         features: k arrays, each broadcastable to (n, 8).
@@ -217,11 +218,11 @@ def _covariance(features: Sequence[FloatArray], policy: Policy, slope: FloatArra
     neighbours, k = policy.lattice.neighbours, len(features)
     gains = np.empty((k, *weight.shape))
     for j, (feature, one) in enumerate(zip(features, np.ascontiguousarray(slope.T), strict=True)):
-        np.take(one, neighbours, out=gains[j], mode="clip")  # anything where no move is possible: it weighs 0
+        np.take(one, neighbours, out=gains[j], mode="clip")  # impossible moves have weight 0, whatever stands here
         gains[j] -= one[:, None]
         gains[j] += feature
     flat, weighted = gains.reshape(k, -1), (gains * weight).reshape(k, -1)
-    # Sums of few long products: a linear algebra library would share them out to threads, at a loss.
+    # A few long sums of products: the threads of a linear algebra library would make them slower.
     sums = np.zeros((k, k))
     for i in range(k):
         for j in range(i + 1):

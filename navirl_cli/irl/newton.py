@@ -1,8 +1,8 @@
 """A trust-region Newton method within bounds, for few variables and exact second derivatives.
 
-Variables on a bound stay there only while the gradient pushes outward, so that a bound is let go as soon as the
-objective gains by it; the trust-region step is exact (one small eigenvalue problem), hence directions of negative
-curvature are followed and not stuck at.
+A variable on a bound stays there only while the gradient points outward. It leaves the bound as soon as that raises the
+objective. The trust-region step is exact (one small eigenvalue problem), so directions of negative curvature are
+followed.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import FloatArray
 
 MAX_ITERATIONS = 200
-#: The Newton step promises less than this gain, in nats: the optimum is reached for every purpose.
+#: Where the Newton step predicts a smaller gain than this, in nats, the search has converged.
 GAIN_TOLERANCE = 1e-9
-#: Of a first search, and of others, which are to learn soon whether they are bound for the same.
+#: Initial radius of the first search, and of the others, which soon test whether they converge to the same maximum.
 FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
 MAX_RADIUS = 16.0
-#: Nats below a known maximum within which it is asked whether the search is bound for it; how far from it, in every
-#: variable or in nats, and how many nats from its value it may seem to land.
+#: A search this many nats below a known maximum is tested for convergence to it. Its predicted end may differ from the
+#: maximum by so much in place (every variable, or nats) and by so much in value (nats).
 NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
-#: Share of the radius by which a step to the region's edge may miss it.
+#: Tolerance of the length of a step to the region's edge, as a share of the radius.
 EDGE = 1e-10
 #: A region this small (in units of the variables) means that the objective contradicts its derivatives.
 MIN_RADIUS = 1e-12
@@ -43,9 +43,9 @@ class Maximum:
     """Where a search ended."""
 
     best: Point
-    #: True where the promised gain fell below the tolerance.
+    #: True where the predicted gain fell below the tolerance.
     converged: bool
-    #: True where the last place that was tried does not exist.
+    #: True where the objective does not exist at the last place tried.
     blocked: bool
     #: (i, k) accepted places and (i,) values there, the start first.
     path: FloatArray
@@ -68,10 +68,10 @@ def maximise(
         bounds: (k,) lower and upper ones.
         free: (k,) variables that may move.
         progress: Called with every accepted value.
-        known: Maxima found before; the search ends, short of convergence, where it is bound for one of them.
+        known: Maxima found before. The search ends early where it is converging to one of them.
 
     Returns:
-        The maximum and the path to it.
+        The maximum and the accepted places before it.
     """
     lower, upper = bounds
     here, path, radius = start, [start], AGAIN_RADIUS if known else FIRST_RADIUS
@@ -81,11 +81,11 @@ def maximise(
             break
         step = _step(here, lower, upper, free, radius)
         promised = _promise(here, step)
-        # A step that the region holds back promises little because it is short, not because the top is near.
+        # A step limited by the region predicts a small gain because it is short, not because the maximum is near.
         if promised < GAIN_TOLERANCE and np.linalg.norm(step) < 0.9 * radius:
             converged = True
             break
-        # A variable that meets its bound stands on it, not a rounding beside it.
+        # A variable that meets its bound is set to it exactly.
         onto = np.where(step == lower - here.x, lower, np.where(step == upper - here.x, upper, here.x + step))
         there = objective(onto)
         gained, blocked = there.value - here.value, there.value == -np.inf
@@ -93,25 +93,25 @@ def maximise(
             radius = 0.25 * float(np.linalg.norm(step))
         elif gained > 0.75 * promised and np.linalg.norm(step) > 0.8 * radius:
             radius = min(2 * radius, MAX_RADIUS)
-        # Below the rounding of the sum a gain cannot be distinguished from noise, and a Newton step is trusted.
+        # A gain below the rounding of the sum cannot be distinguished from noise. The Newton step is trusted then.
         noise = 1e-12 * abs(here.value)
         if gained > 0.05 * promised or (promised < noise and gained > -noise):
             here = there
             path.append(here)
             if progress is not None:
                 progress(here.value)
-    history = np.array([point.x for point in path]), np.array([point.value for point in path])
-    return Maximum(here, converged, blocked, *history)
+    path_arrays = np.array([point.x for point in path]), np.array([point.value for point in path])
+    return Maximum(here, converged, blocked, *path_arrays)
 
 
 def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
-    """Whether a full step from here lands on a known maximum, by place and by value."""
+    """Whether a full step from here ends at a known maximum, by place and by value."""
     if here.value < top.value - NEAR:
         return False
     step = _step(here, *bounds, free, MAX_RADIUS)
     away = here.x + step - top.x
     apart = -0.5 * float(away @ top.hessian @ away)
-    # In units or in nats: where the top is flat, places that are far apart may be the same for every purpose.
+    # In units or in nats: around a flat maximum, places far apart may have the same value.
     near = bool(np.abs(away).max() < PLACE) or 0 <= apart < ALIKE
     return near and abs(here.value + _promise(here, step) - top.value) < SAME
 
@@ -119,8 +119,8 @@ def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], f
 def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bool_], radius: float) -> FloatArray:
     """A step that raises the quadratic model within region and bounds.
 
-    It heads for the model's best place in the region and stops at the first bound, where it heads for the best place
-    along the bound, and so on; the best place along it is taken, so that a bound never costs the ascent.
+    It goes towards the model's best place in the region and stops at the first bound. There it turns to the best place
+    along the bound, and so on. The best of the visited places is taken, so a bound never prevents an ascent.
     """
     outward = ((here.x <= lower) & (here.gradient < 0)) | ((here.x >= upper) & (here.gradient > 0))
     moving = free & ~outward
@@ -129,13 +129,13 @@ def _step(here: Point, lower: FloatArray, upper: FloatArray, free: NDArray[np.bo
     while moving.any():
         gradient = here.gradient[moving] + here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
         left = np.sqrt(max(radius**2 - float(step[~moving] @ step[~moving]), 0.0))
-        direction = np.zeros_like(step)
-        direction[moving] = _region_step(gradient, here.hessian[np.ix_(moving, moving)], left) - step[moving]
+        along = np.zeros_like(step)
+        along[moving] = _region_step(gradient, here.hessian[np.ix_(moving, moving)], left) - step[moving]
         room = np.full_like(step, np.inf)
-        room[direction > 0] = (high - step)[direction > 0] / direction[direction > 0]
-        room[direction < 0] = (low - step)[direction < 0] / direction[direction < 0]
+        room[along > 0] = (high - step)[along > 0] / along[along > 0]
+        room[along < 0] = (low - step)[along < 0] / along[along < 0]
         met = room <= min(float(room.min()), 1.0)
-        step = np.where(met, np.where(direction > 0, high, low), step + min(float(room.min()), 1.0) * direction)
+        step = np.where(met, np.where(along > 0, high, low), step + min(float(room.min()), 1.0) * along)
         if _promise(here, step) > _promise(here, best):
             best = step
         if not met.any():
@@ -161,7 +161,7 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
         if float(step @ step) <= radius**2:
             full: FloatArray = basis @ step
             return full
-    # |p(shift)| falls from infinity to 0 as the shift grows above the largest curvature; 1/|p| is all but linear in it.
+    # |p(shift)| falls from infinity to 0 as the shift grows above the largest curvature; 1/|p| is nearly linear in it.
     floor = max(steepest, 0.0)
     low, high = floor * (1 + 1e-15) + 1e-14, floor + float(np.linalg.norm(slope)) / max(radius, 1e-100) + 1e-12
     shift = high
@@ -172,7 +172,7 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
         if abs(length - radius) < EDGE * radius:
             high = shift
             break
-        if length > 0:  # a saddle has no slope
+        if length > 0:  # the slope is zero at a saddle
             shift += (length / radius - 1) * length**2 / float(step @ (step / (shift - curvature)))
         if not low < shift < high:
             shift = floor + np.sqrt((low - floor) * (high - floor)) if low > floor else 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""What a fit maximises: log-likelihood and prior, as a function of parameters divided by their scales."""
+"""The objective of a fit: log-likelihood plus log prior density, by parameters in units of their scales."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -21,14 +21,14 @@ class Objective:
     """Log-likelihood plus log prior density; -inf where the partition function is infinite."""
 
     evidence: Evidence
-    #: Its terms; its parameters are the first start.
+    #: Gives the terms; its parameters are the first start.
     initial: Reward
-    #: All that is known besides the demonstrations, and the regulariser's part of it.
+    #: The prior including the regulariser, and the regulariser alone.
     prior: Prior
     regulariser: Prior
     #: Number of calls so far.
     evaluations: int = field(default=0, init=False)
-    #: Scores by demonstration wherever it was called.
+    #: Scores by demonstration at every place where it was called.
     _scores: dict[bytes, FloatArray] = field(default_factory=dict, init=False)
 
     @property
@@ -48,7 +48,7 @@ class Objective:
 
     def reward(self, x: FloatArray) -> Reward:
         """The reward at (k,) variables."""
-        # Dividing and multiplying by the scale may leave a bound by a rounding.
+        # Division and multiplication by the scale may cross a bound by a rounding error.
         theta = (
             min(max(value, p.lower), p.upper)
             for value, p in zip((x * self.scale).tolist(), self.initial.parameters, strict=True)
@@ -94,18 +94,18 @@ class Objective:
         return -point.hessian, self.regulariser.precision * np.outer(self.scale, self.scale)
 
     def identified(self, point: Point) -> NDArray[np.bool_]:
-        """(k,) which parameters change the value at all, the regulariser aside: slope or a curvature does not vanish.
+        """(k,) parameters that change the value without the regulariser: their slope or a curvature is not zero.
 
-        Mixed curvatures count, because at a_p = 0 it is the only information on sigma_p.
+        Mixed curvatures count, because at a_p = 0 only they identify sigma_p.
         """
         information, regulariser = self.information(point)
         slope = np.abs(point.gradient - self.regulariser.gradient(point.x * self.scale) * self.scale)
         curvature = np.abs(information - regulariser).max(axis=1)
-        effective: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
-        return effective
+        identified: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
+        return identified
 
     def starts(self, first: Point) -> list[FloatArray]:
-        """Other starts than the first: with the restarts of those parameters that have some."""
+        """The starts besides the first: from the restarts of the parameters that have restarts."""
         starts = []
         for number in range(max((len(parameter.restarts) for parameter in self.initial.parameters), default=0)):
             x = first.x.copy()

@@ -1,4 +1,4 @@
-"""The states of a lattice in order of how far they are from a goal, and the pattern of the matrices in that order."""
+"""The states of a lattice in order of their distance to a goal, and the pattern of the matrices in that order."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from navirl_cli.irl.lattice import Lattice
 
 @dataclass(frozen=True, eq=False)
 class Ordering:
-    """Ranks of states by a distance to the goal, of whatever kind; the goal has rank 0."""
+    """Ranks of states by any distance to the goal; the goal has rank 0."""
 
     lattice: Lattice
     #: Number of the goal's state.
@@ -43,7 +43,7 @@ class Ordering:
         return ranks
 
     def climbs(self, parent: IntArray) -> int:
-        """How often the paths along a tree lead to a state that is farther from the goal, at most.
+        """The largest number of steps to a farther state (by rank) on any path along a tree to the goal.
 
         Args:
             parent: (n,) next state on the path from every state, -1 for the goal.
@@ -53,16 +53,16 @@ class Ordering:
         if not count.any():
             return 0
         while (following != self.goal).any():
-            count = count + count[following]  # twice as far along the path every time
+            count = count + count[following]  # twice as far along the path each time
             following = following[following]
         return int(count.max())
 
     @cached_property
     def _patterns(self) -> tuple["_Pattern", "_Pattern"]:
-        """Of I - L (the steps that lead down, and the diagonal) by columns, and of U (the others) by rows."""
+        """Patterns of I - L (the steps that lead down, and the diagonal) by columns, and of U (the others) by rows."""
         rank = np.arange(self.lattice.size)[:, None]
         above = self.neighbours > rank
-        # Every step up has its reverse, a step down: what stands in a column are the reverses of the steps in its row.
+        # The reverse of a step up is a step down: a column holds the reverses of the steps in its row.
         reverse = self.neighbours * 8 + OPPOSITE
         lower = _Pattern.of(self.neighbours[above], reverse[above], above.sum(axis=1), diagonal=True)
         return lower, _Pattern.of(self.neighbours[above], np.flatnonzero(above), above.sum(axis=1))
@@ -71,7 +71,7 @@ class Ordering:
         """A matrix M >= 0 of steps as I - L, triangular, and the rest U, with M = L + U.
 
         Args:
-            weight: (n, 8) by rank; zero or anything where a move is not possible.
+            weight: (n, 8) by rank; any value where a move is not possible.
 
         Returns:
             csc_array I - L and csr_array U, rows and columns by rank.
@@ -80,30 +80,30 @@ class Ordering:
 
         lower, upper = self._patterns
         shape = (self.lattice.size, self.lattice.size)
-        # On the diagonal stand ones.
+        # The diagonal is 1.
         entries = np.ones(len(lower.indices))
         entries[lower.places] = -weight.ravel()[lower.taken]
         triangular = csc_array((entries, lower.indices, lower.starts), shape=shape)
-        # Each entry is there once, in whatever order; the solver would sort them to find out.
+        # Each entry occurs once, in any order. Without this flag the solver would sort them to check.
         triangular.has_canonical_format = True
         return triangular, csr_array((weight.ravel()[upper.taken], upper.indices, upper.starts), shape=shape)
 
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """A compressed sparse matrix whose entries are some of the steps: where they stand, and which steps they are."""
+    """Pattern of a compressed sparse matrix whose entries are some of the steps."""
 
     starts: IntArray
     indices: IntArray
-    #: Which of the entries are steps, and the place of each of these in (n, 8) arrays, flat.
+    #: Positions of the entries that are steps, and the flat index of each of these steps in (n, 8) arrays.
     places: IntArray
     taken: IntArray
 
     @staticmethod
     def of(indices: IntArray, taken: IntArray, counts: IntArray, *, diagonal: bool = False) -> "_Pattern":
-        """From indices and places of the steps in order, and their number in each row or column.
+        """From indices and positions of the steps in order, and their number in each row or column.
 
-        With a diagonal that stands before the steps. SuperLU takes integers of 32 bits.
+        A diagonal entry precedes the steps. SuperLU takes integers of 32 bits.
         """
         size = len(counts)
         starts = np.concatenate([[0], np.cumsum(counts + int(diagonal))])

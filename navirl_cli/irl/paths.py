@@ -8,7 +8,7 @@ from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.values import Policy
 
-#: A path this many times longer (in steps) than the expected one does not occur in any sample a user can draw.
+#: A sampled path this many times longer (in steps) than expected is practically impossible.
 PATIENCE = 1000
 
 
@@ -57,7 +57,7 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
     ones = np.ones(policy.lattice.size)
     ones[policy.goal] = 0.0
     limit = int(PATIENCE * policy.expected_to_goal(ones)[start]) + 100
-    # Rounding leaves the last sum a little off 1; no draw may fall behind it.
+    # Rounding may leave the last sum below 1; no draw may exceed it.
     threshold = np.cumsum(policy.probability, axis=1)
     threshold /= np.maximum(threshold[:, -1:], 1e-300)
     here = np.full(count, start)
@@ -72,7 +72,8 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
         columns.append(here)
     else:
         raise RewardError(
-            f"a sampled path wandered for {limit} steps without reaching the goal: the cost of length is too low"
+            f"a sampled path did not reach the goal within {limit} steps: the cost of path length is too low; "
+            "choose a more negative c0"
         )
     states = np.stack(columns, axis=1)
     return SampledPaths(states, (states != policy.goal).sum(axis=1) + 1)

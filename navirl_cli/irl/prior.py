@@ -1,4 +1,4 @@
-"""What is known of the parameters before the demonstrations: Gaussian, in natural parameters, so that they add up."""
+"""Gaussian prior of the parameters, in natural parameters, so that two priors add up."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from navirl_cli.irl.terms.term import Parameter
 
 @dataclass(frozen=True, eq=False)
 class Prior(ByContent):
-    """log density = shift.x - x.precision.x / 2 - constant, up to what does not depend on the parameters x."""
+    """log density = shift.x - x.precision.x / 2 - constant, where the constant does not depend on x."""
 
-    #: (k, k) positive semidefinite; a zero row knows nothing of its parameter.
+    #: (k, k) positive semidefinite; a zero row gives no information on its parameter.
     precision: FloatArray
     #: (k,) precision times mean.
     shift: FloatArray
@@ -30,7 +30,7 @@ class Prior(ByContent):
             weight: In nats per squared scale.
 
         Raises:
-            RewardError: The weight is negative or no number.
+            RewardError: The weight is negative or not a number.
         """
         if not weight >= 0:
             raise RewardError(f"`l2`: expected 0 or more, found {weight:g}")
@@ -39,14 +39,14 @@ class Prior(ByContent):
 
     @staticmethod
     def gaussian(mean: FloatArray, covariance: FloatArray) -> "Prior":
-        """A Gaussian, as an earlier fit leaves one.
+        """A Gaussian prior from the estimate and covariance of an earlier fit.
 
         Args:
             mean: (k,).
-            covariance: (k, k); rows and columns that are not finite belong to parameters of which nothing is known.
+            covariance: (k, k); rows and columns that are not finite belong to parameters without information.
 
         Raises:
-            RewardError: What is finite of the covariance is not positive definite.
+            RewardError: The finite part of the covariance is not positive definite.
         """
         known = np.isfinite(np.diag(covariance))
         block = covariance[np.ix_(known, known)]
@@ -60,23 +60,23 @@ class Prior(ByContent):
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """(k,) parameters of which it knows anything."""
+        """(k,) parameters on which it gives information."""
         known: NDArray[np.bool_] = (np.abs(self.precision).max(axis=1) > 0).astype(bool)
         return known
 
     def where(self, mask: NDArray[np.bool_]) -> "Prior":
-        """What it knows of some parameters, which must be independent of the others."""
+        """The prior of some parameters only, which must be independent of the others."""
         return Prior(self.precision * np.outer(mask, mask), self.shift * mask, self.constant)
 
     def __add__(self, other: "Prior") -> "Prior":
-        """Both together."""
+        """The product of both densities."""
         return Prior(self.precision + other.precision, self.shift + other.shift, self.constant + other.constant)
 
     def log_density(self, theta: FloatArray) -> float:
-        """At (k,) parameters, relative to the mean's (for the regulariser: to zero's)."""
+        """Log density at (k,) parameters, relative to that at the mean (for the regulariser: at zero)."""
         return float(self.shift @ theta - theta @ self.precision @ theta / 2) - self.constant
 
     def gradient(self, theta: FloatArray) -> FloatArray:
-        """(k,) of the log density."""
+        """(k,) gradient of the log density."""
         gradient: FloatArray = self.shift - self.precision @ theta
         return gradient

@@ -1,4 +1,4 @@
-"""How the likelihood falls when one parameter is held away from its best value and the others make the best of it."""
+"""Profile likelihood: one parameter is held at values around its estimate, and the others are fitted again."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,11 +16,11 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.series import InfinitePartitionError
 from navirl_cli.irl.status import Status
 
-#: Steps to either side until the profile must have fallen far enough, and how much farther than needed it is drawn.
+#: Largest number of steps to either side, and how far beyond the interval's end the profile is continued.
 MAX_STEPS, BEYOND = 60, 1.6
-#: Nats above the fit that rounding cannot explain.
+#: A likelihood this many nats above the fit is not due to rounding.
 BETTER = 1e-3
-#: The ends of the interval are found to this share of the fall that makes them, within so many tries.
+#: Tolerance of the fall at the interval's ends, as a share of it, and the largest number of trials.
 END_TOLERANCE, END_TRIES = 1e-3, 60
 
 
@@ -36,7 +36,8 @@ class Profile(ByContent):
     #: (m, k) all parameters at each.
     theta: FloatArray
     level: float
-    #: Ends of the interval; None where the likelihood does not fall far enough on that side, be it up to a bound.
+    #: Ends of the interval; None where the likelihood does not fall far enough on that side, for instance up to a
+    #: bound.
     lower: float | None
     upper: float | None
 
@@ -47,7 +48,7 @@ class Profile(ByContent):
 
 
 def fall_at(level: float) -> float:
-    """By how much the log-likelihood falls to the ends of an interval: half the chi-square quantile (Wilks 1938)."""
+    """Fall of the log-likelihood at the ends of an interval: half the chi-square quantile (Wilks 1938)."""
     return NormalDist().inv_cdf(0.5 + level / 2) ** 2 / 2
 
 
@@ -61,17 +62,18 @@ def profile(
     """Follow the best likelihood to both sides of the estimate.
 
     Args:
-        evidence: What was learnt from.
-        found: The fit of it.
+        evidence: The demonstrated steps of the fit.
+        found: The fit.
         name: The parameter.
-        level: Of the interval.
+        level: Confidence level of the interval.
         progress: Called with the number of values done.
 
     Returns:
         The profile.
 
     Raises:
-        RewardError: The reward has no such parameter, the data do not identify it, or a better fit was found.
+        RewardError: The reward has no such parameter, the demonstrations do not identify it, or the profile found a
+            better fit.
     """
     j = number_of(found.reward, name)
     if found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
@@ -113,9 +115,9 @@ class _Walker:
         self.step = 0.4 * error if isfinite(error) else 0.1 * self.parameter.scale
 
     def at(self, value: float, guess: Reward) -> float:
-        """The best relative log-likelihood where the parameter has a value: from a guess of the others, and restarts.
+        """The best relative log-likelihood at a value of the parameter, from a guess of the others and from restarts.
 
-        Restarts, because the best values of the others may lie on another branch from here on. -inf without a policy.
+        The restarts are needed because the best values of the others may jump to another branch. -inf without a policy.
         """
         if value in self.seen:
             return self.seen[value][0]
@@ -127,7 +129,7 @@ class _Walker:
         if relative > BETTER:
             values = ",".join(f"{p.name}={x:.6g}" for p, x in zip(reward.parameters, reward.theta, strict=True))
             raise RewardError(
-                f"`profile` {self.parameter.name}: a better fit was found; fit again with `init` {values}"
+                f"`profile` {self.parameter.name}: the profile found a better fit; fit again with `init` {values}"
             )
         self.seen[value] = relative, reward
         if self.progress is not None:
@@ -144,21 +146,21 @@ class _Walker:
                 break
             before, relative = self.seen[here][0], self.at(there, guess)
             if relative >= -fall:
-                crossed = None  # another branch of the others may rise again
+                crossed = None  # the likelihood may rise again on another branch of the others
             elif crossed is None:
                 crossed = here, there
             if relative < -BEYOND * fall or there in {self.parameter.lower, self.parameter.upper}:
                 break
-            # Where it is flat the strides grow, where it is steep they shorten.
+            # Strides grow where the profile is flat and shrink where it is steep.
             step *= 1.5 if before - relative < 0.15 * fall else 0.7 if before - relative > 0.5 * fall else 1.0
             here, guess = there, self.seen[there][1]
         return None if crossed is None else self._crossing(*crossed, fall)
 
     def _crossing(self, inside: float, outside: float, fall: float) -> float:
-        """The value at which the likelihood has fallen by so much, between two values on either side of it."""
+        """The value at which the likelihood has fallen by a given amount, between two values on either side of it."""
         middle = inside
         for number in range(END_TRIES):
-            # The root of the fall is all but linear in the parameter; near a cliff it is not: every third try halves.
+            # The root of the fall is nearly linear in the parameter, but not near a jump: every third trial bisects.
             low, high = (sqrt(max(-self.seen[value][0], 0.0)) for value in (inside, outside))
             share = 0.5 if number % 3 == 2 or not isfinite(high) else (sqrt(fall) - low) / (high - low)
             middle = inside + (outside - inside) * share

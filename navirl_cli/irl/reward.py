@@ -1,4 +1,4 @@
-"""A reward: terms with their parameters' values, put together on a scene."""
+"""A reward: terms with the values of their parameters, evaluated on a scene."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class Reward:
 
     @staticmethod
     def named(values: Mapping[str, float], terms: tuple[Term, ...] = PAPER_TERMS) -> "Reward":
-        """A reward from values by name; what is not named keeps its initial value.
+        """A reward from values by name; the other parameters keep their initial values.
 
         Raises:
             RewardError: A name is unknown or a value out of bounds.
@@ -98,7 +98,7 @@ class Reward:
         return Jet(total, first, second)
 
     def by_cell(self, scene: Scene) -> FloatArray:
-        """(n,) the part of the reward that belongs to the cell, not to the move (Fig. 8 right)."""
+        """(n,) the part of the reward that depends on the cell only, not on the move (Fig. 8 right)."""
         total = np.zeros(scene.lattice.size)
         at = 0
         for term in self.terms:
@@ -111,7 +111,7 @@ class Reward:
 
 
 def _closed(array: FloatArray, goal: int) -> FloatArray:
-    """The array with zeros in the goal's row; arrays by move alone stay as they are, for no move leaves the goal."""
+    """The array with zeros in the goal's row; arrays by move alone are unchanged, because no move leaves the goal."""
     if len(array) == 1:
         return array
     closed = array.copy()

@@ -1,4 +1,4 @@
-"""What a robot plans in: a map, a start, a goal, people, and the nominal path between start and goal."""
+"""A scene for planning: a map, a start, a goal, people, and the nominal path between start and goal."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -46,10 +46,10 @@ class Scene:
             start: (2,) column and row.
             goal: (2,) column and row.
             people_m: (p, 2) m, map frame.
-            lattice: The lattice around the start, where one is known already.
+            lattice: The lattice around the start, if it is already known.
 
         Raises:
-            SceneError: Start or goal is not free, or no path leads from one to the other.
+            SceneError: Start or goal is not free, or no path connects them.
         """
         lattice = Lattice.around(grid, start) if lattice is None else lattice
         first, last = (int(state) for state in lattice.states_of(np.stack([start, goal])))
@@ -79,7 +79,7 @@ class Scene:
         from_start = self.lattice.costs_to(self.start, self.lattice.step_m)
         to_goal = self.ordering.distance
         shortest = to_goal[self.start]
-        # Sums of many steps in different order differ in their last digits.
+        # Sums of the same steps in different orders differ in their last digits.
         on_path: NDArray[np.bool_] = from_start + to_goal <= shortest * (1 + 1e-9)
         return on_path
 
@@ -93,7 +93,7 @@ class Scene:
         return deviation
 
     def nominal_line_m(self) -> FloatArray:
-        """The nominal path as a line: a shortest path, pulled straight where no obstacle is in between.
+        """The nominal path as a line: a shortest path, made straight where no obstacle lies between.
 
         Returns:
             (k, 2) m, map frame, from the start's centre to the goal's.
@@ -114,8 +114,8 @@ class Scene:
         xy = self.lattice.xy_m - self.lattice.xy_m[self.start]
         ahead = self.lattice.xy_m[self.goal] - self.lattice.xy_m[self.start]
         right = (xy[:, 0] * ahead[1] - xy[:, 1] * ahead[0]) / np.hypot(*ahead)
-        aside = np.abs(right) + 1e-3 * right  # of two paths that mirror each other the left one
-        # Small enough never to make a longer path the cheaper one.
+        aside = np.abs(right) + 1e-3 * right  # of two mirrored paths the left one
+        # Too small to make a longer path cheaper.
         tie_break = 1e-8 * aside[:, None] * self.lattice.grid.resolution_m
         return self.lattice.descend(self.start, self.goal, self.lattice.step_m + tie_break)
 
@@ -129,9 +129,9 @@ class Scene:
 
 
 def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
-    """The path of a planner that takes people for obstacles and knows nothing else of them.
+    """The path of a planner that treats people as obstacles only.
 
-    It keeps to the straight path as long as the detour grows no longer by it, as a local planner does that meets an
+    It follows the straight line as long as this does not lengthen the detour, like a local planner that reacts to an
     obstacle only when it is near.
 
     Args:
@@ -142,7 +142,7 @@ def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
         (k, 2) m, map frame.
 
     Raises:
-        SceneError: With the people as obstacles no path is left.
+        SceneError: With the people as obstacles, no path connects start and goal.
     """
     grid = scene.lattice.grid.inflated(clearance_m, scene.people_m)
     blocked = Scene.on(grid, scene.lattice.cells[scene.start], scene.lattice.cells[scene.goal], scene.people_m)
@@ -151,7 +151,7 @@ def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
 
 
 def scenes_of(demonstrations: Iterable[Demonstration]) -> list[Scene]:
-    """The scene of every demonstration; equal scenes are one object, wherever they stand in the list.
+    """The scene of every demonstration; equal scenes are one object.
 
     The goal of a scene is the cell in which the trial ended, as in the study: a demonstration is a path into its
     absorbing goal.

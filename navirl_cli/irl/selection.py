@@ -21,7 +21,7 @@ class Steps(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What a reward is learnt from."""
+    """The chosen demonstrations and their steps."""
 
     demonstrations: tuple[Demonstration, ...]
     evidence: Evidence
@@ -43,7 +43,7 @@ def select(
         demonstrations: To choose from.
         conditions: Values of :class:`~navirl_cli.demos.demonstration.Condition`; none for all.
         cycle: Number of the cycle; None for all.
-        only_corrected: Only those in which the person intervened.
+        only_corrected: Only demonstrations in which the person intervened.
         steps: All steps, or those during contact; demonstrations without such steps are left out.
 
     Returns:
@@ -72,7 +72,7 @@ def select(
 def _not_among(
     demonstrations: Sequence[Demonstration], conditions: Collection[str], cycle: int | None
 ) -> DemonstrationError:
-    """The error that no demonstration is of the conditions and of the cycle, with those that there are."""
+    """The error that no demonstration has the conditions and the cycle; it lists the existing ones."""
     arguments = [*(["`condition`"] if conditions else []), *([] if cycle is None else ["`cycle`"])]
     asked = [*([" or ".join(conditions)] if conditions else []), *([] if cycle is None else [f"cycle {cycle}"])]
     there: dict[str, None] = {}

@@ -1,14 +1,14 @@
-"""Linear systems (I - M) x = b with M >= 0, solved as positive series and, where these are slow, faster.
+"""Linear systems (I - M) x = b with M >= 0, solved as positive series, or by a Krylov method where the series are slow.
 
-M is split into L, triangular in the order of the states, and the rest U. Solving with I - L is forward substitution:
-for a positive right side it adds positive terms only, is therefore exact in every entry to rounding, and has no
-fill-in. The rest is swept in:
+M is split into L, triangular in the order of the states, and the rest U. Solving with I - L is forward substitution.
+For a positive right side it adds positive terms only, so every entry is exact to rounding. It has no fill-in. Sweeps
+add U:
 
     x = sum_k G^k x_0,   x_0 = (I - L)^-1 b,   G = (I - L)^-1 U.
 
-A sweep costs little more than a product with M, so that hundreds of them are no trouble. Where the spectral radius of G
-comes so close to 1 that thousands would be needed, a Krylov method (BiCGSTAB) solves (I - G) x = x_0 on variables
-divided by their sizes, so that its accuracy, which is relative to the largest, is that of every entry.
+A sweep costs little more than a product with M, so hundreds of them are affordable. Where the spectral radius of G is
+so close to 1 that thousands would be needed, a Krylov method (BiCGSTAB) solves (I - G) x = x_0. Its accuracy is
+relative to the largest entry. The variables are therefore divided by their sizes, which makes every entry as accurate.
 """
 
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.ordering import Ordering
 
-#: Relative size at which the rest of a positive series counts as nothing.
+#: Relative size below which the remainder of a positive series is neglected.
 TOLERANCE = 1e-14
-#: Sweeps after which the Krylov method takes over, and after which all is given up.
+#: Number of sweeps after which the Krylov method starts, and after which the solution fails.
 PLAIN_SWEEPS = 300
 MAX_SWEEPS = 5000
-#: A sum that the last sweep raised by no more than this share has the right size everywhere.
+#: A sum that the last sweep raised by at most this share has the right size in every entry.
 SETTLED = 0.1
 #: Steps of the Krylov method, and how often it restarts from its last result.
 KRYLOV_STEPS, CORRECTIONS = 500, 16
-#: Sweeps in which a vector is to become proof that the partition function is infinite.
+#: Number of sweeps within which a vector must prove that the partition function is infinite.
 PROOF_SWEEPS = 40
-#: Guaranteed relative error of z beyond which no number is returned.
+#: Largest guaranteed relative error of z that is accepted.
 ACCEPTED = 1e-9
-#: Stands for zero where one divides.
+#: Replaces zero in denominators.
 TINY = 1e-290
 
 
@@ -47,10 +47,10 @@ class ValueStatus(StrEnum):
 
 
 class InfinitePartitionError(RewardError):
-    """The partition function is infinite, or so close to infinite that this cannot be decided."""
+    """The partition function is infinite, or too close to infinite to be decided."""
 
     def __init__(self, status: ValueStatus) -> None:
-        """Keep the status beside the message."""
+        """Keep the status with the message."""
         self.status = status
         super().__init__(
             f"{status.value}: a step costs so little under these parameters that endless detours outweigh the direct "
@@ -59,7 +59,7 @@ class InfinitePartitionError(RewardError):
         )
 
     def __reduce__(self) -> tuple[type["InfinitePartitionError"], tuple[ValueStatus]]:
-        """Cross process borders with the status, from which the message is rebuilt."""
+        """Cross process borders with the status, from which the message is built again."""
         return type(self), (self.status,)
 
 
@@ -78,7 +78,7 @@ class Splitting:
         from scipy.sparse.linalg import splu
 
         triangular, rest = ordering.split(weight)
-        # Supernodes and panels, made for fill-in, only cost time where there is none.
+        # Supernodes and panels serve fill-in. Without fill-in they only cost time.
         factor = splu(
             triangular,
             permc_spec="NATURAL",
@@ -102,7 +102,7 @@ class Splitting:
     def sweep(self, x: FloatArray, *, transposed: bool = False) -> FloatArray:
         """G x = (I - L)^-1 U x, or (I - L)^-T U^T x."""
         rest = self.rest_transposed if transposed else self.rest
-        # The solver leaves columns one after the other, the product wants rows.
+        # The solver returns column-major arrays; the product is faster on row-major ones.
         return self.start(rest @ np.ascontiguousarray(x), transposed=transposed)
 
     def solve(self, right: FloatArray, size: FloatArray, sweeps: int, *, transposed: bool = False) -> FloatArray:
@@ -111,14 +111,14 @@ class Splitting:
         Args:
             right: (n,) or (n, k) by rank.
             size: (n,) positive; x / size is of comparable size in all entries.
-            sweeps: How many it will take at a guess; before, it is not asked whether they are enough.
+            sweeps: Estimated number of sweeps; convergence is not tested before.
             transposed: Solve with the transpose.
 
         Returns:
             x, same shape, to rounding relative to the largest x / size of its column.
 
         Raises:
-            InfinitePartitionError: So close to an infinite partition function that x cannot be found.
+            InfinitePartitionError: x cannot be found, because the partition function is too close to infinite.
         """
         measure = 1 / size if right.ndim == 1 else 1 / size[:, None]
         first = term = total = self.start(right, transposed=transposed)
@@ -154,7 +154,7 @@ class Splitting:
             z, accurate in every entry, and the number of sweeps it took.
 
         Raises:
-            InfinitePartitionError: There is no finite positive z, or z cannot be computed accurately.
+            InfinitePartitionError: There is no finite positive z, or this cannot be decided, or z is not accurate.
         """
         first = term = total = self.start(right)
         untried = True
@@ -166,7 +166,7 @@ class Splitting:
                 share = float((term / np.maximum(total, TINY)).max())
             if not share <= 1:
                 break  # it overflows
-            # Beside the hard value no z is below 1: what is has not been reached yet.
+            # Relative to the hard value every z is at least 1: smaller entries have not been reached yet.
             settled = share < SETTLED and float(total.min()) > 0.5
             if settled and share < 1e3 * TOLERANCE and share * _rest_of_series(term, before, total) <= TOLERANCE:
                 return total, sweeps
@@ -198,7 +198,7 @@ class Splitting:
         return z if certain and 4 * float(t.max()) * worst <= ACCEPTED else None
 
     def _refuse_infinite(self, x: FloatArray) -> None:
-        """Raise where a positive vector, or what sweeps make of it, proves the partition function infinite."""
+        """Raise where a positive vector, or its image after sweeps, proves the partition function infinite."""
         x = np.maximum(x, TINY * float(x.max()))
         for _ in range(PROOF_SWEEPS):
             after = self.sweep(x)
@@ -214,7 +214,7 @@ class Splitting:
         Args:
             lacking: (n,) right side in units of size.
             size: (n,) positive.
-            accuracy: Norm of what is left of the right side, relative to it.
+            accuracy: Norm of the residual relative to that of the right side.
             transposed: With the transpose.
 
         Returns:
@@ -226,17 +226,20 @@ class Splitting:
             left: FloatArray = u - self.sweep(size * u, transposed=transposed) / size
             return left
 
-        # Numbers near the smallest double make norms of zero; the system is linear.
+        # The norm of numbers near the smallest double is zero. The system is linear, so it can be scaled.
         unit = float(np.abs(lacking).max()) or 1.0
         operator = LinearOperator((len(lacking), len(lacking)), matvec=without_sweep, dtype=float)
-        # Where it breaks down or takes too long, its last result is still the better guess to restart from.
+        # Where it breaks down or takes too long, its last result is still a better guess for a restart.
         found, _ = bicgstab(operator, lacking / unit, rtol=accuracy, maxiter=KRYLOV_STEPS)
         step: FloatArray = found * unit
         return step
 
 
 def _rest_of_series(term: FloatArray, before: FloatArray, total: FloatArray) -> float:
-    """Bound on what follows the last term, in multiples of it: the ratios of terms only fall (Collatz and Wielandt)."""
+    """Bound on the remainder after the last term, in multiples of it.
+
+    The ratios of successive terms only fall (Collatz and Wielandt).
+    """
     alive = before > total * 1e-290
     most = float((term[alive] / before[alive]).max(initial=0.0))
     return most / (1 - most) if most < 1 else np.inf

@@ -10,7 +10,7 @@ from navirl_cli.irl.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class SolvedScene:
-    """Where the policy of a reward leads in a scene; unlike the policy it crosses process borders."""
+    """Visits and reward by state of a solved scene. Unlike a policy it can be passed between processes."""
 
     scene: Scene
     #: (n,) expected visits of every state by a path from the scene's start.

@@ -1,4 +1,4 @@
-"""How a fit ends, and what that means."""
+"""How a fit ended and what that means."""
 
 from enum import StrEnum
 

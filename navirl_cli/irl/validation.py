@@ -1,4 +1,4 @@
-"""How well a reward predicts people that it was not learnt from: each participant is left out in turn."""
+"""Leave-one-out cross-validation: the steps of each participant are predicted from the other participants."""
 
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -30,12 +30,12 @@ class Validation(ByContent):
     log_likelihoods: dict[str, FloatArray]
     #: The learnt model's k parameters.
     parameters: tuple[Parameter, ...]
-    #: (p, k) sums of dr/dtheta over the left-out steps: demonstrated, and expected of what was learnt from the others;
-    #: and the standard error of their difference, from the chance in the paths and in what was learnt.
+    #: (p, k) sums of dr/dtheta over the left-out steps: demonstrated, and expected from the fit to the others; and the
+    #: standard error of their difference, from the variance of the paths and of the fit.
     demonstrated: FloatArray
     expected: FloatArray
     deviation: FloatArray
-    #: (p, k) whether the others identify the parameter; where they do not, it keeps the value at which the fits start.
+    #: (p, k) whether the others identify the parameter. If not, it kept its initial value.
     identified: NDArray[np.bool_]
     #: (p,) how the learnt model's fit to the others ended.
     statuses: tuple[Status, ...]
@@ -46,14 +46,14 @@ class Validation(ByContent):
 
     @property
     def mismatch(self) -> FloatArray:
-        """(p, k) |f_demo - E f| in standard errors: about 1 where people differ no more than paths of one person do."""
+        """(p, k) |f_demo - E f| in standard errors: about 1 where participants differ as little as paths of one do."""
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.abs(self.demonstrated - self.expected) / self.deviation)
 
 
 @dataclass(frozen=True, eq=False)
 class _LeftOut:
-    """What one left-out participant says."""
+    """Results for one left-out participant."""
 
     steps: int
     log_likelihoods: dict[str, float]
@@ -72,10 +72,10 @@ def cross_validate(
     executor: Executor | None = None,
     progress: Callable[[int, str], None] | None = None,
 ) -> Validation:
-    """Learn from all participants but one and ask how likely that one's steps are; so for each.
+    """Fit to all participants but one and compute the likelihood of that one's steps, for each participant in turn.
 
-    Baselines beside the reward: the same without the person, the cost of length alone (the shortest
-    path with some noise), and equally likely moves.
+    The reward is compared with simpler models: the same reward without the person, the cost of path length alone (the
+    shortest path with noise), and equally likely moves.
 
     Args:
         evidence: Demonstrations of at least two participants.
@@ -113,7 +113,7 @@ def cross_validate(
 
 
 def _models(initial: Reward) -> dict[str, Reward]:
-    """The reward and what it is compared with, by name; the first is the reward."""
+    """The reward and the models it is compared with, by name; the first is the reward."""
     return {
         "learnt": initial,
         "no person": _with(initial, lambda term: not term.about_people),
@@ -134,7 +134,7 @@ def _with(initial: Reward, keep: Callable[[Term], bool]) -> Reward:
 
 
 def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: str) -> _LeftOut:
-    """Fit every model without one participant, and ask it for that one."""
+    """Fit every model without one participant and evaluate it on that participant."""
     others = np.array([participant != name for participant in evidence.participants], dtype=int)
     learning, held_out = evidence.repeated(others), evidence.repeated(1 - others)
     fits = {model: fit(learning, initial, l2) for model, initial in models.items()}
@@ -142,10 +142,10 @@ def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: s
     values["uniform"] = held_out.uniform_log_likelihood()
     learnt = next(iter(fits.values()))
     found, demonstrated = likelihood(held_out, learnt.reward), feature_sums(held_out, learnt.reward)
-    # The gradient is the difference of the sums; it varies with the paths, and with what was learnt by its derivative.
+    # The gradient is the difference of the sums. It varies with the paths and, by its derivative, with the fit.
     covariance = np.nan_to_num(learnt.covariance)
     spread = found.information + found.information @ covariance @ found.information
-    # A parameter that the others do not identify predicts nothing.
+    # A parameter that the others do not identify gives no prediction.
     deviation = np.where(learnt.identified, np.sqrt(np.diag(spread)), np.nan)
     return _LeftOut(
         steps=held_out.steps,

@@ -2,9 +2,9 @@
 
 With deterministic moves and an absorbing goal, z = exp(V) solves (I - M) z = e_goal with M(s, s') = exp(r(s, a)) >= 0.
 Values reach -600 within a few metres, so the system is scaled twice. First M is conjugated with the hard value
-(Dijkstra), which bounds its entries by 1 where rewards are negative; on large maps with a better guess, found band by
-band. Then the series of :mod:`navirl_cli.irl.series` gives z beside that guess, accurate in every entry, and M
-conjugated with z as well is the policy P, in which visits and expected sums are solved by the same factor.
+(Dijkstra), which bounds its entries by 1 where rewards are negative; on large maps a better guess is found band by
+band. Then the series of :mod:`navirl_cli.irl.series` gives z relative to that guess, accurate in every entry. M
+conjugated with z as well is the policy P. Visits and expected sums are solved with the same factor.
 """
 
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering
 from navirl_cli.irl.series import InfinitePartitionError, Splitting, ValueStatus
 
-#: Steps from the goal within which z cannot leave the range of a double beside the hard value: of the moves three or
-#: four lead down, and 4^250 is e^347.
+#: Within so many steps from the goal, z relative to the hard value stays in the range of a double: three or four of the
+#: moves lead down, and 4^250 is e^347.
 PLAIN_STEPS = 250
-#: A block of states within which z cannot leave it beside the best path through the block.
+#: Size of a block of states within which z relative to the best path through the block stays in that range.
 STEPS_PER_BAND = 100.0
-#: Every climb that best paths make in the order of the states costs a sweep; beyond so many a new order is cheaper.
+#: Every climb of a best path in the order of the states costs a sweep. Beyond so many, a new order is cheaper.
 MAX_CLIMBS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Policy:
-    """The soft-optimal policy of one reward on one scene, with the means to solve linear systems in it."""
+    """The soft-optimal policy of one reward on one scene, with the factors for its linear systems."""
 
     ordering: Ordering
     #: (n,) soft value V = log z.
@@ -87,7 +87,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
     """Soft values and policy of a reward.
 
     Args:
-        ordering: The states by the length of their path to the goal. Where the best paths take another order, a
+        ordering: The states by the length of their path to the goal. Where the best paths differ much from these, a
             better order is made.
         reward: (n, 8) reward of every step by state, -inf where a move is not possible and in the goal.
 
@@ -95,18 +95,18 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
         The policy.
 
     Raises:
-        InfinitePartitionError: The partition function is infinite, or cannot be distinguished from infinite.
+        InfinitePartitionError: The partition function is infinite, or too close to infinite to be decided.
     """
     lattice = ordering.lattice
     if reward.max() >= 0:
         back = reward[lattice.neighbours, OPPOSITE]
-        if (reward + back >= 0).any():  # to and fro for nothing: a cycle of weight 1 is enough
+        if (reward + back >= 0).any():  # moving to and fro costs nothing: a cycle of weight 1 is enough
             raise InfinitePartitionError(ValueStatus.INFINITE)
-    # Dijkstra needs positive costs; as the shift is exact whatever it is, a clipped cost is as good. No step leaves the
-    # goal: any positive cost will do.
+    # Dijkstra needs positive costs. The result is exact for any shift, so a clipped cost is valid. No step leaves the
+    # goal, so any positive cost is valid there.
     floor = 1e-3 * float(lattice.step_m.min())
     cost = np.maximum(np.where(np.isfinite(reward), -reward, 1.0), floor)
-    hard, parent = lattice.cheapest_to(ordering.goal, cost)
+    hard, parent = lattice.cheapest_tree(ordering.goal, cost)
     large = float(ordering.distance.max()) > PLAIN_STEPS * float(lattice.step_m.min())
     if ordering.climbs(parent) > MAX_CLIMBS:
         ordering = Ordering(lattice, ordering.goal, hard, np.where(lattice.possible, cost, np.inf).min(axis=1))
@@ -114,7 +114,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
     ranked, shift = reward[order], -hard[order]
     if large:
         if (cost == floor).any():
-            raise InfinitePartitionError(ValueStatus.UNDECIDED)  # steps that pay: there is no hard value to start from
+            raise InfinitePartitionError(ValueStatus.UNDECIDED)  # steps with positive reward: no hard value
         up = parent[order]
         shift = _raised(ordering, ranked, shift, np.where(up >= 0, ordering.rank[up], -1))
     weight = _conjugated(ordering, ranked, shift)
@@ -137,10 +137,10 @@ def _conjugated(ordering: Ordering, ranked: FloatArray, shift: FloatArray) -> Fl
 
 
 def _raised(ordering: Ordering, ranked: FloatArray, hard: FloatArray, parent: IntArray) -> FloatArray:
-    """A guess so near to the value that z fits a double on maps where it would not beside the hard value.
+    """A guess of the value, close enough for z to fit a double on maps where the hard value is not.
 
-    One pass over the steps that lead down, band by band away from the goal. Each band's z is taken relative to the best
-    path down to the band below and on from there with the values found, so that no number leaves the range of a double.
+    One pass over the steps that lead down, band by band away from the goal. Each band's z is relative to the best path
+    down to the band below and to the values found from there. No number leaves the range of a double.
 
     Args:
         ordering: The states.
@@ -155,7 +155,7 @@ def _raised(ordering: Ordering, ranked: FloatArray, hard: FloatArray, parent: In
     low = 0
     while low < len(hard):
         high = _end_of_band(ordering, low)
-        raised[low:high] += _gain_on_the_way(raised - hard, parent, low, high)
+        raised[low:high] += _gain_along_path(raised - hard, parent, low, high)
         raised[low:high] += _gain_in_the_band(ordering, ranked, raised, low, high)
         low = high
     return raised
@@ -175,16 +175,16 @@ def _end_of_band(ordering: Ordering, low: int) -> int:
         length *= 4
 
 
-def _gain_on_the_way(gain: FloatArray, parent: IntArray, low: int, high: int) -> FloatArray:
-    """What was gained over the hard value where the best paths leave the band of ranks low to high downward."""
+def _gain_along_path(gain: FloatArray, parent: IntArray, low: int, high: int) -> FloatArray:
+    """Gain over the hard value where the best paths leave the band of ranks low to high downward."""
     leaves = parent[low:high].copy()
     while (inside := (leaves >= low) & (leaves < high)).any():
-        leaves[inside] = leaves[leaves[inside] - low]  # as these were moved on already, twice as far every time
+        leaves[inside] = leaves[leaves[inside] - low]  # these were moved on already, so twice as far each time
     return np.where((leaves >= 0) & (leaves < low), gain[leaves], 0.0)
 
 
 def _gain_in_the_band(ordering: Ordering, ranked: FloatArray, raised: FloatArray, low: int, high: int) -> FloatArray:
-    """log z of the band by its down-going steps beside the guess, given the values of the bands below."""
+    """log z of the band from its steps that lead down, relative to the guess, given the values of the bands below."""
     from scipy.sparse import csr_array, eye_array
     from scipy.sparse.linalg import spsolve_triangular
 
@@ -203,6 +203,6 @@ def _gain_in_the_band(ordering: Ordering, ranked: FloatArray, raised: FloatArray
     z = spsolve_triangular(triangular, right, lower=True, unit_diagonal=True)
     if not np.isfinite(z).all():
         raise InfinitePartitionError(ValueStatus.UNDECIDED)
-    # Where the best path leads up first, the steps that lead down find less than it.
+    # Where the best path first leads up, the steps that lead down give a smaller value.
     gain: FloatArray = np.log(np.maximum(z, 1.0))
     return gain

@@ -11,7 +11,7 @@ from navirl_cli.irl.terms.term import Jet, Parameter
 
 @dataclass(frozen=True)
 class PersonalSpace:
-    """Each step costs for being near to people; several people add up."""
+    """Each step near people has a cost; the costs of several people add up."""
 
     parameters = (
         Parameter(

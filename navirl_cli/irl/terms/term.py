@@ -1,4 +1,4 @@
-"""What a term of the reward is: parameters, and a value with its derivatives on a scene."""
+"""A term of the reward: parameters, and a value with its derivatives on a scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,10 +20,10 @@ class Parameter:
     upper: float
     #: The value in the unit above that counts as 1 for regularisation and step lengths.
     scale: float
-    #: Where a fit starts when nothing else is said (the study's initial values).
+    #: Initial value of a fit by default (the study's initial values).
     initial: float
     meaning: str
-    #: Where a fit starts again: the likelihood may have more than one slope in this parameter.
+    #: Further initial values of a fit: the likelihood may have several maxima in this parameter.
     restarts: tuple[float, ...] = ()
 
 
@@ -43,7 +43,7 @@ class Jet:
 
 
 class Term(Protocol):
-    """A summand of the reward: a frozen dataclass, so that it equals its copies."""
+    """A term of the reward: a frozen dataclass, so that equal terms compare equal."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -51,7 +51,7 @@ class Term(Protocol):
 
     @property
     def about_people(self) -> bool:
-        """Whether it depends on people, so that a model without people lacks it."""
+        """Whether it depends on people; a model without people leaves it out."""
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives with respect to the term's parameters, in reward per step."""
