@@ -1,8 +1,8 @@
 """CPU time of the commands as a user runs them, in multiples of `python -c "import numpy"`.
 
-python benchmarks/commands.py [--quick] [--json]. CPU time is that of the whole process with its children, user and
-system. Baseline and commands run in turns, and medians are compared. The commands run on one sample log and its
-demonstrations; evaluate and report also on the demonstrations of the published study, where its data are at hand
+python benchmarks/commands.py [--quick] [--json]. CPU time is the user and system time of the process and its children.
+Baseline and commands run alternately, and medians are compared. The commands run on one sample log and its
+demonstrations; evaluate and report also on the demonstrations of the published study, if its data are available
 (NAVIRL_STUDY_DIR, or ../shared/study). Each row ends with its bar; exit 0 only where every bar holds. --quick leaves
 out the study and the demo.
 """
@@ -40,7 +40,7 @@ class Job:
 
 
 def environment() -> dict[str, str]:
-    """Commands find navirl as it stands here, and the programs of this Python."""
+    """Environment of the commands: navirl of this checkout, and the programs of this Python."""
     paths = {"PATH": str(Path(sys.executable).parent), "PYTHONPATH": str(ROOT)}
     return {**os.environ, **{name: os.pathsep.join([first, os.environ.get(name, "")]) for name, first in paths.items()}}
 
@@ -58,7 +58,7 @@ def cpu_s(words: Iterable[object], folder: Path) -> float:
 
 
 def navirl(folder: Path, *words: object) -> None:
-    """Make a file that the commands need; what is printed does not matter."""
+    """Make a file that the commands need, and ignore the output."""
     cpu_s((*NAVIRL, *words), folder)
 
 
@@ -94,7 +94,7 @@ def study_jobs(folder: Path) -> list[Job]:
 
 
 def measured(jobs: Sequence[Job], runs: int, folder: Path) -> list[Row]:
-    """Baseline and commands in turns, the medians as multiples."""
+    """Run baseline and commands alternately; give the medians as multiples."""
     baseline: list[float] = []
     times: dict[str, list[float]] = {job.what: [] for job in jobs}
     for _ in range(runs):
@@ -118,7 +118,7 @@ def main() -> int:
             if STUDY.is_dir():
                 rows += measured(study_jobs(folder), 3, folder)
             else:
-                print(f"the published study is not at hand in {STUDY}; set NAVIRL_STUDY_DIR", file=sys.stderr)
+                print(f"the published study is not available in {STUDY}; set NAVIRL_STUDY_DIR", file=sys.stderr)
             # 25 s of CPU where importing numpy takes 0.2 s
             rows += measured([Job("make demo, installed", ("sh", ROOT / "sample_logs" / "demo.sh"), 125.0)], 1, folder)
     return report(rows, as_json=options.json)

@@ -1,10 +1,10 @@
 """Lines as a robot would drive them along paths of cells, rasterised by every rule and used for a fit.
 
 Paths of cells are sampled from the policy of known parameters. A line is driven along each: through a uniformly sampled
-point in each cell, with corners rounded as by a robot that responds late, and observed as poses with noise. Only its
-ends are centres, as marks on the floor may be. The lines are rasterised on the same grid, or on one shifted by a random
-part of a cell, as maps are. The fit to these cells is compared with the fit to the sampled cells. The difference is due
-to driving and rule, without the estimator's own bias and chance.
+point in each cell, with corners rounded as by a robot with a delayed response, and observed as poses with
+noise. Only its ends are cell centres, like marks on a floor. The lines are rasterised on the same grid, or on one
+shifted by a random part of a cell, as maps are. The fit to these cells is compared with the fit to the sampled cells.
+The difference is due to driving and rule. It excludes the estimator's own bias and variance.
 """
 
 from collections.abc import Sequence
@@ -130,7 +130,7 @@ def _learnt(demonstrations: Sequence[Demonstration], truth: Reward) -> tuple[Flo
 
 
 def _until_arrival(cells: IntArray) -> IntArray:
-    """A trial ends at its first arrival in the goal's cell."""
+    """A trial ends when it first reaches the goal's cell."""
     arrived = (cells == cells[-1]).all(axis=1)
     return cells[: int(arrived.argmax()) + 1]
 

@@ -1,9 +1,9 @@
-"""Break small logs at random and read them: never a traceback, a hang, much memory, or a silently shortened result.
+"""Read small logs that are broken at random: no traceback, hang, large memory or silently shortened result is allowed.
 
 python benchmarks/fuzz.py [--count N] [--seed S] [--keep FOLDER] [--quick] [--json]. Each row ends with its bar; the
-exit code is 0 only where every bar holds. tests/verdicts.py states what may come of a broken log. What never may is
-printed with the number from which tests/mutations.py makes the same broken log again; the log is kept where a folder is
-given. Memory is that of the whole process, with what the tests need. --quick takes 1,000 logs in place of 100,000.
+exit code is 0 only where every bar holds. tests/verdicts.py states the allowed outcomes of a broken log. A forbidden
+outcome is printed with the number from which tests/mutations.py makes the same broken log again. --keep keeps the log.
+Memory is that of the process, including the test code. --quick takes 1,000 logs instead of 100,000.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from navirl_cli.parallel import cores
 
 COUNT, QUICK, AT_ONCE = 100_000, 1000, 200
 MOST_S, MOST_MB = 10.0, 500
-#: A process that hangs where no signal reaches it prints where, and ends, after this time, s.
+#: A process that hangs and handles no signal prints its stack and ends after this time, s.
 HANGS_S = 240.0
 
 
@@ -34,7 +34,7 @@ def main() -> int:
     """Break, read, print, compare with the bars."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, help=f"number of logs; by default {COUNT}")
-    parser.add_argument("--seed", type=int, default=0, help="another seed breaks them otherwise")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the mutations")
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the logs with a forbidden outcome")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} logs")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")

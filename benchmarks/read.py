@@ -1,18 +1,18 @@
-"""Measure how long reading a long log takes, against reading and decompressing alone and against other readers.
+"""Measure the time to read a long log, compared with reading and decompressing alone and with other readers.
 
 python benchmarks/read.py [--quick] [--json] [--folder FOLDER]. Each row ends with its bar; the exit code is 0 only
 where every bar holds. The task is to read (t, fx, fy) of all wrenches and (t, x, y, yaw) of all odometry as arrays,
-from a log of 20 minutes and 1 GB (read_log.py) in the page cache. Each run of a reader is a new process, so that its
-peak memory is its own, with that of the interpreter. The readers take turns: slow ones run once, fast ones three times.
-Times are medians without imports, which have a column of their own; ratios are medians over the turns. Values are
+from a log of 20 minutes and 1 GB (read_log.py) in the page cache. Each run of a reader is a new process. Its peak
+memory includes the interpreter. The readers run alternately: slow ones once, fast ones three times. Times are medians
+without imports, which have their own column. Ratios are medians over the rounds. Values are
 compared by digests of their bytes.
 
-The bound reads the chunks that hold the topics and decompresses them in one thread; it knows their places and checks
+The bound reads the chunks that hold the topics and decompresses them in one thread. It knows their positions and checks
 nothing. It is measured twice: as a plain Python program, and with the file read into one buffer. With glibc the former
 takes four times as long, because each freed megabyte is returned to the system and comes back page by page.
 
---quick reads 2 minutes in place of 20; its ratios have no bars, because they include the cost of first calls. --folder
-keeps the logs, or uses those that are there.
+--quick reads 2 minutes instead of 20. Its ratios have no bars, because they include the cost of first calls. --folder
+keeps the logs, or uses existing ones.
 """
 
 import argparse
@@ -68,7 +68,7 @@ class Measured:
 
     variant: str
     reader: str
-    #: Time of imports and of what the reader may know beforehand.
+    #: Time of imports and of preparation that does not count.
     ready_s: float
     work_s: float
     peak_mb: float
@@ -255,11 +255,11 @@ def bars(variant: str, found: Sequence[Measured], *, quick: bool) -> list[Row]:
     runs = {reader: [one for one in found if one.reader == reader] for reader in (*FAST, *SLOW)}
     ours_s = statistics.median(one.work_s for one in runs[NAVIRL])
     ratios = [
-        Row.at_most(f"{variant}: navirl over the bound", over(runs[NAVIRL], runs[BOUND]), "", 1.8),
-        Row(f"{variant}: navirl over the bound with one buffer", over(runs[NAVIRL], runs[KEPT]), ""),
-        Row(f"{variant}: navirl on the cut file over the bound", over(runs[WALK], runs[BOUND]), ""),
+        Row.at_most(f"{variant}: navirl / bound", over(runs[NAVIRL], runs[BOUND]), "", 1.8),
+        Row(f"{variant}: navirl / bound with one buffer", over(runs[NAVIRL], runs[KEPT]), ""),
+        Row(f"{variant}: navirl on the cut file / bound", over(runs[WALK], runs[BOUND]), ""),
         *(
-            Row.at_least(f"{variant}: {reader} over navirl", runs[reader][0].work_s / ours_s, "", least)
+            Row.at_least(f"{variant}: {reader} / navirl", runs[reader][0].work_s / ours_s, "", least)
             for reader, least in ((MCAP, 12), (ROSBAGS, 6))
             if runs[reader]
         ),
@@ -285,7 +285,7 @@ def same(variant: str, reader: str, theirs: Sequence[Measured], ours: Sequence[M
     """A row with the arrays of a reader that differ from those of navirl in any run."""
     runs = [one.digests for one in (*theirs, *ours)]
     differing = [name for name in runs[0] if len({digests[name] for digests in runs}) > 1]
-    what = f"{variant}: arrays of {reader} unlike navirl's" + "".join(f", {name}" for name in differing)
+    what = f"{variant}: arrays of {reader} that differ from navirl's" + "".join(f", {name}" for name in differing)
     return Row.at_most(what, len(differing), "", 0)
 
 

@@ -1,14 +1,14 @@
-"""Learn known parameters back from simulated demonstrations.
+"""Recover known parameters from simulated demonstrations.
 
 python benchmarks/recovery.py [--quick] [--json]. Each row ends with its bar; exit 0 only where every bar holds.
 
-First from cells: 600 data sets of 26 paths drawn from the policy of the study's published parameters. Their 95 %
-intervals must cover the truth in 90 to 98 %, and the fit's bias must stay below 0.2 standard errors, those of the
-expected information at the truth. Beside the measured bias stand what theory expects of maximum likelihood, and what
-is left when each fit is corrected by the bias that theory expects at its own parameters (--correct-bias).
+First from cells: 600 data sets of 26 paths, sampled from the policy of the study's published parameters. The 95 %
+intervals must cover the truth in 90 to 98 % of the data sets. The bias of the fit must be below 0.2 standard errors
+(from the expected information at the truth). Two more rows compare it with theory: the first-order bias of maximum
+likelihood, and the bias that remains when each fit is corrected by its own first-order bias (--correct-bias).
 
-Then from driven lines (driven.py), by every rule that makes cells of them: the bias that each adds, and which rule
-should be the default. --quick has 20 data sets and 4, and widens the bars by two Monte Carlo errors.
+Then from driven lines (driven.py), rasterised by every rule: the bias that each rule adds, and the rule that should be
+the default. --quick takes 20 and 4 data sets, and widens the bars by two Monte Carlo errors.
 """
 
 import argparse
@@ -42,12 +42,13 @@ from navirl_cli.parallel import map_in_order  # noqa: E402
 
 SEED = 2020
 DEMONSTRATIONS = 26
-#: Of 200 the share that is covered has a Monte Carlo error of 1.5 points: as good intervals miss the bar now and then.
+#: With 200 data sets the covered share has a Monte Carlo error of 1.5 points, so valid intervals sometimes miss the
+#: bar.
 DATA_SETS, QUICK_DATA_SETS = 600, 20
 #: 95 % of a normal distribution lie within so many standard errors.
 WITHIN = 1.959964
 COVERAGE, MOST_BIAS = (0.90, 0.98), 0.2
-#: A robot at 0.4 m/s that answers in 0.3 s turns about as the study's poses do over 0.1 to 0.4 m.
+#: A robot at 0.4 m/s with a delay of 0.3 s turns about as the study's poses do over 0.1 to 0.4 m.
 WORLDS = (
     (World("grid off by part of a cell", 0.12, 0.01, shifted=True), 40),
     (World("grid as drawn", 0.12, 0.01, shifted=False), 24),
@@ -90,7 +91,7 @@ def recovered(number: int) -> Recovered:
 
 
 def theory() -> tuple[FloatArray, FloatArray]:
-    """(k,) standard errors and (k,) bias that theory expects of a fit to 26 demonstrations at the truth."""
+    """(k,) standard errors and (k,) first-order bias of a fit to 26 demonstrations at the truth."""
     evidence = evidence_of(make.drawn(passing_scene(), PUBLISHED, DEMONSTRATIONS, SEED))
     information = likelihood(evidence, PUBLISHED).information
     everything = np.ones(len(information), dtype=bool)
@@ -98,7 +99,7 @@ def theory() -> tuple[FloatArray, FloatArray]:
 
 
 def coverage(fits: Sequence[Recovered]) -> FloatArray:
-    """(k,) share of the fits whose 95 % interval holds the truth."""
+    """(k,) share of the fits whose 95 % interval covers the truth."""
     inside = [np.abs(one.theta - PUBLISHED.theta) <= WITHIN * one.errors for one in fits]
     share: FloatArray = np.mean(inside, axis=0)
     return share
@@ -133,12 +134,12 @@ def cell_rows(count: int, *, quick: bool) -> list[Row]:
             most = MOST_BIAS + (2 * error if quick else 0.0)
             held = kind != "bias with --l2 at its default"
             rows.append(Row(what, mean, "s.e.", f"< {most:.2g}" if held else "", bool(abs(mean) < most) or not held))
-    rows += [Row(f"{name}: bias expected by theory", x, "s.e.") for name, x in zip(names, expected, strict=True)]
+    rows += [Row(f"{name}: first-order bias by theory", x, "s.e.") for name, x in zip(names, expected, strict=True)]
     return rows
 
 
 def line_rows(*, quick: bool) -> list[Row]:
-    """What every rule adds to the parameters' bias, and whether the default is the rule that it should be."""
+    """The bias that every rule adds, and whether the default is the least biased rule."""
     rows, worlds = [], []
     for world, count in WORLDS[:1] if quick else WORLDS:
         several = range(count // 10 if quick else count)
@@ -149,9 +150,9 @@ def line_rows(*, quick: bool) -> list[Row]:
     for rule, size, error in zip(RULES, sizes, spread, strict=True):
         rows.append(Row(f"all worlds, {rule}: overall bias (Monte Carlo error {error:.2f})", float(size), "s.e."))
     best, default = best_rule(worlds), ExtractSettings().rasterizer
-    what = f"the default, {default}: more bias than the least"
+    what = f"bias of the default ({default}) minus the least bias"
     excess = float(sizes[RULES.index(default)] - sizes.min())
-    # A few data sets in one world decide nothing.
+    # A few data sets in one world are not enough to decide.
     rows.append(Row(what, excess, "s.e.", "" if quick else f"is {best}", quick or best == default))
     return rows
 
@@ -161,7 +162,7 @@ def _refits(number: int, world: World) -> Refits:
 
 
 def _world_rows(world: World, done: Sequence[Refits], away: FloatArray) -> list[Row]:
-    """Rows of one way to drive: away are (n, rules, k) differences in standard errors."""
+    """Rows of one driving model: away are (n, rules, k) differences in standard errors."""
     rows = []
     spread = resampled([away]).std(axis=0)
     for i, rule in enumerate(RULES):
@@ -173,9 +174,9 @@ def _world_rows(world: World, done: Sequence[Refits], away: FloatArray) -> list[
         what = f"{head}: overall bias (Monte Carlo error {spread[i]:.2f})"
         rows.append(Row(what, float(overall([away])[i]), "s.e."))
         rows.append(Row(f"{head}: share of cells as drawn", float(np.mean([one.shared[i] for one in done])), ""))
-        rows.append(Row(f"{head}: diagonal steps a path", float(np.mean([one.diagonal[i] for one in done])), ""))
+        rows.append(Row(f"{head}: diagonal steps per path", float(np.mean([one.diagonal[i] for one in done])), ""))
     drawn = float(np.mean([one.drawn_diagonal for one in done]))
-    return [*rows, Row(f"{world.name}, as drawn: diagonal steps a path", drawn, "")]
+    return [*rows, Row(f"{world.name}, as drawn: diagonal steps per path", drawn, "")]
 
 
 def main() -> int:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """One figure beside its bar; a row without a bar is there to be read."""
+    """One figure beside its bar; a row without a bar is for information."""
 
     what: str
     value: float
@@ -46,7 +46,7 @@ def _number(value: float) -> str:
 
 
 def median_seconds(work: Callable[[], object], runs: int, warm_up: int = 1) -> float:
-    """Median wall time of a call after some that do not count, s."""
+    """Median wall time of a call after warm-up calls, s."""
     for _ in range(warm_up):
         work()
     times = []

@@ -1,12 +1,11 @@
-"""Measure how one gradient of one demonstration's likelihood grows with the map, from a thousand cells to a million.
+"""Measure the time of one gradient of one demonstration's likelihood, on maps of a thousand to a million cells.
 
-python benchmarks/scale.py [--quick] [--json] [--plot FILE]. Three series: an open hall at a cost of length of -54 /m
-(that of the study) and of -25 /m (near where the partition function ceases to be finite), and an office floor at -54
-/m. Every line is a process of its own, whose peak memory includes the interpreter, and the building of the scene,
-which has a column of its own: lattice, shortest paths, nominal cells. Time is the median of a few gradients after a
-first one. The bar on growth compares each size of a series with each smaller one: t / (n ln n) may not be more than
-twice as large. Everything runs on one thread. --quick stops at 1e5 cells, --plot draws the series with a line of n ln
-n.
+python benchmarks/scale.py [--quick] [--json] [--plot FILE]. Three series: an open hall at c0 = -54 /m (as in the study)
+and at c0 = -25 /m (near an infinite partition function), and an office floor at -54 /m. Every line is measured in its
+own process. The peak memory includes the interpreter and the scene: lattice, shortest paths, nominal cells. The time to
+build the scene has its own column. Time is the median of a few gradients after a first one. The bar on growth compares
+each size of a series with each smaller one: t / (n ln n) may be at most twice as large. Everything runs on one thread.
+--quick stops at 1e5 cells. --plot draws the series with a line of n ln n.
 """
 
 import argparse
@@ -35,22 +34,22 @@ SIZES = (1_000, 3_162, 10_000, 31_623, 100_000, 316_228, 1_000_000)
 #: Smaller than this a floor has no rooms.
 SMALLEST_OFFICE, LARGEST_QUICK = 10_000, 100_000
 STUDY_C0, LOW_C0 = PUBLISHED.theta[0], -25.0
-#: How much more than n ln n time may grow.
+#: Largest growth of t / (n ln n).
 FACTOR = 2.0
-#: Seconds of measuring a size, about.
+#: Approximate time of measurement for each size, s.
 PATIENCE_S = 5.0
 
 
 @dataclass(frozen=True)
 class Series:
-    """Maps of one kind under one cost of length."""
+    """Maps of one type at one cost of path length c0."""
 
     kind: str
     c0: float
 
     @property
     def label(self) -> str:
-        """Kind and cost."""
+        """Type and cost."""
         return f"{self.kind}, c0 {self.c0:.0f} /m"
 
 
@@ -116,7 +115,7 @@ def measure(series: Series, cells: int) -> Measured:
     begun = time.perf_counter()
     evidence = evidence_of([one])
     scene = evidence.scenes[0].scene
-    reward.on(scene)  # asks for shortest paths and distances, which the scene keeps
+    reward.on(scene)  # computes shortest paths and distances, which the scene keeps
     scene_s = time.perf_counter() - begun
     first_s = median_seconds(lambda: value_and_gradient(evidence, reward), 1, warm_up=0)
     runs = min(max(int(PATIENCE_S / first_s), 1), 15)
@@ -134,7 +133,7 @@ def bars(series: Sequence[Measured]) -> list[Row]:
         (large.ns_per_n_log_n / small.ns_per_n_log_n, small.cells, large.cells)
         for small, large in combinations(series, 2)
     )
-    rows = [Row.at_most(f"{last.label}: growth over n ln n, worst from {small} to {large}", growth, "", FACTOR)]
+    rows = [Row.at_most(f"{last.label}: growth / n ln n, largest from {small} to {large}", growth, "", FACTOR)]
     if last.label.startswith("office") or last.cells < LARGEST_QUICK * 2:
         return rows
     limit_s = 8.0 if last.label == SERIES[0].label else 30.0
@@ -145,7 +144,7 @@ def bars(series: Sequence[Measured]) -> list[Row]:
 
 
 def print_table(found: Sequence[Measured]) -> None:
-    """Print a line a map."""
+    """Print one line for each map."""
     width = max(len(one.label) for one in found)
     print(f"{'map':<{width}} {'cells':>8} {'scene s':>8} {'first s':>8} {'gradient s':>10}", end=" ")
     print(f"{'t/(n ln n) ns':>14} {'peak MB':>8} {'sweeps':>7}")
@@ -156,7 +155,7 @@ def print_table(found: Sequence[Measured]) -> None:
 
 
 def plot(found: Sequence[Measured], path: Path) -> None:
-    """Draw time over cells, one line a series."""
+    """Draw time over cells, one line for each series."""
     import matplotlib.pyplot as plt
     import numpy as np
 

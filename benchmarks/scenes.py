@@ -19,7 +19,7 @@ RESOLUTION_M = 0.1
 #: The parameters that the study published for all its participants (Sec. IV-D), SI units: c0, a_g, a_p, sigma_p.
 PUBLISHED = Reward((-54.12586, -0.873514, -4.907188, 1.679499))
 
-#: An office: a corridor between two rows of rooms, again and again; cells.
+#: An office: repeated corridors between two rows of rooms; sizes in cells.
 ROOM, CORRIDOR, WALL, DOOR = 40, 16, 4, 6
 
 
@@ -35,17 +35,17 @@ def hallway() -> Scene:
 
 
 def open_hall(cells: int) -> Scene:
-    """A square hall without obstacles; the way crosses it slantwise, and a person stands beside its middle."""
+    """A square hall without obstacles. The path crosses it diagonally, and a person stands beside its middle."""
     side = round(sqrt(cells))
     return _across(np.zeros((side, side), dtype=bool))
 
 
 def office(cells: int, seed: int = 1) -> Scene:
-    """A square floor of rooms along corridors, each room with a door somewhere, and crossing corridors at its ends.
+    """A square floor of rooms along corridors, with one random door in each room and cross corridors at the ends.
 
     Args:
-        cells: About so many free ones.
-        seed: Of the doors' places.
+        cells: Approximate number of free cells.
+        seed: Seed of the positions of the doors.
     """
     rng = np.random.default_rng(seed)
     period = CORRIDOR + 2 * (ROOM + WALL) + WALL

@@ -1,8 +1,8 @@
-"""Time what a user of the published study waits for: rasterisation, drawn paths and their metrics, import, evaluation.
+"""Measure the work on the published study: rasterisation, sampled paths and their metrics, import, evaluation.
 
 python benchmarks/study.py [--quick] [--json]. Needs the published data (environment variable NAVIRL_STUDY_DIR: the
 unpacked runs, or the archive). Each row ends with its bar; exit 0 only where every bar holds. The bars are for four
-participants; of more data the times are divided by the number of participants and multiplied by four.
+participants. For more data the times are divided by the number of participants and multiplied by four.
 """
 
 import argparse
@@ -40,22 +40,22 @@ def main() -> int:
     options = parser.parse_args()
     where = Path(os.environ.get("NAVIRL_STUDY_DIR") or Path(__file__).parents[2] / "shared" / "study")
     if not where.exists():
-        print(f"the published study's data are not at hand in {where}; set NAVIRL_STUDY_DIR", file=sys.stderr)
+        print(f"the published study's data are not available in {where}; set NAVIRL_STUDY_DIR", file=sys.stderr)
         return 2
     runs = 1 if options.quick else 5
     return report([*paths(where, runs), *drawn(where, runs), *commands(where, runs)], as_json=options.json)
 
 
 def paths(where: Path, runs: int) -> list[Row]:
-    """Every published path onto the grid, and how many become the published cells."""
+    """Rasterise every published path, and count the paths with the published cells."""
     found = [participant_of(run) for run in runs_in(where)[0]]
     every = [(path, one.grid) for one in found for path in one.paths]
     times = [median_seconds(lambda p=path, g=grid: rasterize(p.xy_m, g), 3 * runs) for path, grid in every]
     same = sum(rasterize(path.xy_m, grid).tolist() == path.cells.tolist() for path, grid in every)
     return [
         Row.at_least(f"cells as published, of {len(every)} paths", same, "", len(every)),
-        Row.at_most("discretising a path, median", 1e3 * sorted(times)[len(times) // 2], "ms", 10.0),
-        Row.at_most("discretising a path, slowest", 1e3 * max(times), "ms", 10.0),
+        Row.at_most("rasterising a path, median", 1e3 * sorted(times)[len(times) // 2], "ms", 10.0),
+        Row.at_most("rasterising a path, slowest", 1e3 * max(times), "ms", 10.0),
     ]
 
 
@@ -77,8 +77,8 @@ def drawn(where: Path, runs: int) -> list[Row]:
         return [metric.lines(lines) for metric in METRICS if metric.lines is not None]
 
     return [
-        Row.at_most("drawing 10,000 paths", median_seconds(draw, runs), "s", 3.0),
-        Row.at_most("measuring them", median_seconds(measure, runs), "s", 10.0),
+        Row.at_most("sampling 10,000 paths", median_seconds(draw, runs), "s", 3.0),
+        Row.at_most("metrics of 10,000 paths", median_seconds(measure, runs), "s", 10.0),
     ]
 
 
@@ -99,7 +99,7 @@ def commands(where: Path, runs: int) -> list[Row]:
 
 
 def seconds(*words: object) -> float:
-    """Wall time of navirl with some words, s."""
+    """Wall time of a navirl command, s."""
     begun = time.perf_counter()
     subprocess.run([str(BIN / "navirl"), *map(str, words)], check=True, capture_output=True)  # noqa: S603
     return time.perf_counter() - begun

@@ -1,7 +1,7 @@
 """Compare the demonstrations extracted from the sample logs with the simulated truth.
 
-python benchmarks/truth.py [--quick] [--json]. Each row ends with its bar; exit 0 only where every bar holds. The same
-bars are tests; this prints the figures. It takes a few seconds; --quick does the same.
+python benchmarks/truth.py [--quick] [--json]. Each row ends with its bar; exit 0 only where every bar holds. Tests
+check the same bars. This prints the figures in a few seconds. --quick changes nothing.
 """
 
 import argparse

@@ -1,9 +1,9 @@
-"""The paper's algorithm as its text describes it, in plain numpy: the baseline that the fit is measured against.
+"""The paper's algorithm as its text describes it, in plain numpy: the baseline of the fit's benchmark.
 
-Soft value iteration until no value changes by 0.01, forward propagation until 5 % of the mass are left, Adam. Written
-for speed: flat preallocated arrays over the free cells' bounding box, shifts by slicing, nothing in a loop over cells.
-Its recursion runs in either of two domains with the same iterates: LogDomain keeps V and takes log-sum-exps, which is
-safe on any map; ExpDomain keeps exp(V), which saves every exponential but holds only while V > -1380.
+Soft value iteration until no value changes by 0.01, forward propagation until 5 % of the mass are left, Adam. It is
+written for speed: flat preallocated arrays over the free cells' bounding box, shifts by slicing, no loop over cells.
+Its recursion runs in one of two domains with the same iterates. LogDomain keeps V and takes log-sum-exps, which is safe
+on any map. ExpDomain keeps exp(V), which needs no exponentials but is valid only while V > -1380.
 Cell units: c0 per cell, a_g per m^2, a_p, and the width w of the personal space in cells.
 """
 
@@ -22,9 +22,9 @@ LOWER, UPPER = np.array([-np.inf, -np.inf, -np.inf, 0.1]), np.array([-0.1, 0.0, 
 VALUE_TOLERANCE, MASS_LEFT = 0.01, 0.05
 RATE, RATE_FACTOR, RATE_EVERY, DECAY, MAX_STEPS = 0.1, 0.8, 100, 0.01, 500
 VALUE_CHANGE, GRADIENT_LEFT = 0.01, 0.1
-#: No map that is measured here takes so many sweeps: the partition function is infinite.
+#: After so many sweeps the partition function is taken as infinite.
 MAX_SWEEPS = 20_000
-#: Logarithm below which a summand is nothing beside 1; exp takes twice as long where it underflows.
+#: Logarithm below which a summand is negligible relative to 1. exp takes twice as long where it underflows.
 SMALLEST = -60.0
 DIAGONAL = np.sqrt(2.0)
 
@@ -39,7 +39,7 @@ class DenseScene:
         self.place: IntArray = (scene.lattice.cells - low) @ np.array([1, self.width])
         self.start, self.goal = (int(self.place[state]) for state in (scene.start, scene.goal))
         resolution_m = scene.lattice.grid.resolution_m
-        # Beside the free cells squared distances are zero and no mass ever is.
+        # Outside the free cells squared distances and mass are zero.
         self.deviation_m2 = self._spread(scene.deviation_m**2)
         (person_m,) = scene.people_m
         self.person_cells2 = self._spread((((scene.lattice.xy_m - person_m) / resolution_m) ** 2).sum(axis=1))
@@ -54,14 +54,14 @@ class DenseScene:
         return flat
 
     def shifts(self) -> list[tuple[slice, float]]:
-        """Where the eight neighbours of the inner cells stand, and the length of the step to them in cells."""
+        """Positions of the eight neighbours of the inner cells, and the length of the step to them in cells."""
         begin, end, width = self.inner.start, self.inner.stop, self.width
         offsets = [1, -1, width, -width, width + 1, width - 1, -width + 1, -width - 1]
         return [(slice(begin + o, end + o), 1.0 if abs(o) in (1, width) else float(DIAGONAL)) for o in offsets]
 
 
 class Recursion(Protocol):
-    """One way to run the recursion."""
+    """One domain of the recursion."""
 
     def run(self, c0: float, by_cell: FloatArray) -> tuple[float, FloatArray, float]:
         """V(start), expected visits by cell without the goal, and the expected length of the path in cells."""
@@ -128,7 +128,7 @@ class LogDomain:
 class ExpDomain:
     """Exponentials of the values: a sweep is sums over neighbours alone."""
 
-    #: exp(V) of the goal; as near to the largest double as sums of neighbours allow.
+    #: exp(V) of the goal; as close to the largest double as sums of neighbours allow.
     TOP = 1e300
 
     def __init__(self, scene: DenseScene) -> None:
@@ -151,7 +151,7 @@ class ExpDomain:
             self._sum_neighbours(z, straight, diagonal, after)
             after *= gain
             after[goal] = self.TOP
-            # From zero the values only rise, so that this bounds every change; none to reach counts as a change too.
+            # From zero the values only rise, so this bounds every change. An unreached start counts as a change too.
             np.multiply(z, np.exp(VALUE_TOLERANCE), out=bound)
             settled = (after <= bound).all()
             z, after = after, z

@@ -1,4 +1,4 @@
-"""The command line: commands are imported when called, and expected errors become messages here and only here."""
+"""The command line. Commands are imported when called. Only this module turns expected errors into messages."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ from navirl_cli.errors import NavirlError
 #: Summaries of the commands, in the order of the work. The module navirl_cli.commands.NAME holds the command NAME, with
 #: _ for -. It is imported when the command is called, so that help and completion are fast.
 COMMANDS = {
-    "inspect": "Show what logs hold, and what extract would take from them.",
+    "inspect": "Show the content of logs, and the topics that extract would use.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
@@ -50,7 +50,9 @@ class _Root(LazyGroup):
     examples=[
         Example("From logs to demonstrations", "navirl extract p01.mcap p02.mcap p03.mcap -o demos.json"),
         Example("From demonstrations to a reward", "navirl fit demos.json -o reward.json"),
-        Example("Where the learnt policy leads", "navirl plot policy demos.json --reward reward.json -o policy.pdf"),
+        Example(
+            "Expected visits of the learnt policy", "navirl plot policy demos.json --reward reward.json -o policy.pdf"
+        ),
     ],
 )
 @click.version_option(__version__, prog_name="navirl")
@@ -65,8 +67,8 @@ def cli(debug: bool) -> None:
 
 def main() -> None:
     """Entry point of the command ``navirl``."""
-    # Our matrices are sparse or small: the threads of a BLAS would cost more at the start than they give back. They are
-    # set before numpy is imported, and only where the user has not set them.
+    # The matrices are sparse or small: starting the threads of a BLAS would cost more time than they save. Their number
+    # is set before numpy is imported, unless the user has set it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "_NAVIRL_COMPLETE" in os.environ:
         from navirl_cli.commands.completion import use_whole_words

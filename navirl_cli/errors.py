@@ -1,25 +1,25 @@
-"""Known trouble, as one tree of exceptions.
+"""Expected errors, as one tree of exceptions.
 
-Every message names the file, topic or field, what was expected, what was found and the remedy, in one line; the
-command line prints it and exits with 1. Anything else that is raised is a bug and keeps its traceback.
+Every message names the file, topic or field, what was expected, what was found and the remedy, in one line. The command
+line prints it and exits with 1. Any other exception is a bug and keeps its traceback.
 """
 
 from collections.abc import Iterable
 
-#: Names that a message lists at most.
+#: Largest number of names that a message lists.
 MOST_NAMES = 20
 
 
 class NavirlError(Exception):
-    """Base of all trouble that navirl expects and can explain."""
+    """Base of all errors that navirl expects and explains."""
 
 
 class ArgumentError(NavirlError):
-    """An argument of a call cannot be right, whatever the data hold."""
+    """An argument is invalid, whatever the data hold."""
 
 
 class LogError(NavirlError):
-    """A log cannot be read, or does not hold what is needed."""
+    """A log cannot be read, or lacks required data."""
 
 
 class FrameError(LogError):
@@ -31,11 +31,11 @@ class DemonstrationError(NavirlError):
 
 
 class GridError(NavirlError):
-    """A map or a cell does not fit."""
+    """A map or a cell is invalid."""
 
 
 class SceneError(NavirlError):
-    """A scene has no path from start to goal, or a person where none can stand."""
+    """A scene has no path from start to goal, or a person stands at an impossible place."""
 
 
 class RewardError(NavirlError):
@@ -51,22 +51,25 @@ class MissingPackageError(NavirlError):
 
 
 class NavirlWarning(UserWarning):
-    """Results stand, but something was lost, skipped or not reached; only the Python interface uses it."""
+    """A warning: the results are valid, but data was lost or skipped, or a fit did not converge.
+
+    Only the Python interface gives it.
+    """
 
 
 def brief(value: object) -> str:
-    """A value as a message shows it: on one line, and not longer than a line."""
+    """A value as a message shows it: on one line, cut to the length of a line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
-    """What a message says of a name that does not exist: the names that do, and those that are near.
+    """The message for an unknown name: the existing names, and those of similar spelling.
 
     Args:
         what: The field or the type of thing, such as "trial"; empty where the context names it.
         name: What was found.
-        known: What there is.
+        known: The existing names.
     """
     names = list(known)
     shown = [repr(one) for one in names[:MOST_NAMES]]
@@ -79,7 +82,7 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Up to three names that are spelled much like a name or contain it, the nearest first."""
+    """Up to three names that contain a name or have a similar spelling, the most similar first."""
     from difflib import get_close_matches
 
     by_lower = {one.lower(): one for one in known}

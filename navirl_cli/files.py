@@ -1,4 +1,4 @@
-"""Files: named with their hash when they are read, and written as a whole or not at all."""
+"""Files: identified by name and hash when read, and written completely or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from navirl_cli.errors import ArtefactError
 
 @dataclass(frozen=True)
 class Input:
-    """A file that something was made from."""
+    """An input file of a result."""
 
     file: str
     sha256: str
@@ -40,17 +40,17 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
     """Write a file under a temporary name in the same folder and rename it when the block ends well.
 
     Args:
-        path: The file to be.
+        path: The file to write.
         force: Whether an existing file may be replaced.
 
     Yields:
-        The temporary name. After an exception nothing is left of it.
+        The temporary name. After an exception the temporary file is removed.
 
     Raises:
         ArtefactError: The file exists and may not be replaced, or its folder is missing or cannot be written.
     """
     check_writable(path, force=force)
-    path = path.resolve()  # what a link names is replaced, not the link
+    path = path.resolve()  # replace the target of a link, not the link
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         yield temporary
@@ -63,11 +63,11 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
-    """Make a folder for results where it is missing, with those above it.
+    """Make a folder for results, with its parents, unless it exists.
 
     Yields:
-        The folder. Folders that were made here and are still empty when the block ends are removed again, also after
-        an exception or an interrupt.
+        The folder. New folders that are still empty when the block ends are removed, also after an exception or an
+        interrupt.
 
     Raises:
         ArtefactError: It cannot be made.
@@ -81,13 +81,13 @@ def new_folder(path: Path) -> Iterator[Path]:
     try:
         yield path
     finally:
-        with suppress(OSError):  # of the first that holds something; those above it hold it
+        with suppress(OSError):  # of the first folder that is not empty; its parents hold it
             for one in made:
                 one.rmdir()
 
 
 def check_writable(path: Path, *, force: bool) -> None:
-    """Refuse early what could not be written at the end of a long computation.
+    """Check before a long computation that its result can be written.
 
     Raises:
         ArtefactError: As in :func:`replacing`.

@@ -1,4 +1,4 @@
-"""Work over many logs or fits, through one function that any executor can stand behind."""
+"""Parallel work over many logs or fits, through one function that takes any executor."""
 
 import os
 import signal
@@ -14,18 +14,18 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def map_in_order(
     function: Callable[[Item], Result], items: Sequence[Item], executor: Executor | None = None
 ) -> Iterator[Result]:
-    """Apply a function to every item, in other processes where that can pay, and yield results in order.
+    """Apply a function to every item, in other processes if that can be faster, and yield results in order.
 
     Args:
-        function: Importable by name; what it takes and returns crosses process borders.
-        items: The work.
+        function: Importable by name. Its arguments and results are passed between processes.
+        items: The arguments.
         executor: Where to run; by default local processes, or this process for a single item.
 
     Yields:
@@ -41,7 +41,7 @@ def map_in_order(
 
         with ProcessPoolExecutor(workers, initializer=_Worker.listen) as pool:
             try:
-                with _no_interrupt():  # Python forgets one that comes while a process forks
+                with _no_interrupt():  # Python loses an interrupt that comes while a process forks
                     results = pool.map(partial(_Worker.run, function), items)
                 yield from results
             except BaseException:
@@ -51,7 +51,7 @@ def map_in_order(
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Have interrupts wait until the block ends; processes that begin in it let them wait until they listen."""
+    """Delay interrupts until the block ends. Processes that begin in it delay them until they handle them."""
     if not hasattr(signal, "pthread_sigmask"):  # as on Windows, which does not fork either
         yield
         return
@@ -63,9 +63,9 @@ def _no_interrupt() -> Iterator[None]:
 
 
 class _Worker:
-    """What a local process does on an interrupt: what it works on cleans up after itself, and nothing else begins.
+    """Interrupts of a local process: the present item is cleaned up, and no other item begins.
 
-    Without this, processes that wait for work print a traceback, and those that work go on until they are done.
+    Without this, waiting processes print a traceback, and working processes continue until they are done.
     """
 
     busy = False
@@ -73,14 +73,14 @@ class _Worker:
 
     @classmethod
     def listen(cls) -> None:
-        """Take interrupts from now on, in a new process."""
+        """Handle interrupts from now on, in a new process."""
         signal.signal(signal.SIGINT, cls._interrupted)
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
     @classmethod
     def run(cls, function: Callable[[Item], Result], item: Item) -> Result:
-        """Work on an item, unless there was an interrupt."""
+        """Process an item, unless there was an interrupt."""
         if cls.stopped:
             raise KeyboardInterrupt
         cls.busy = True
@@ -92,12 +92,12 @@ class _Worker:
     @classmethod
     def _interrupted(cls, _number: int, _frame: FrameType | None) -> None:
         again, cls.stopped = cls.stopped, True
-        if cls.busy and not again:  # the second one would interrupt the cleaning up after the first
+        if cls.busy and not again:  # a second one would interrupt the clean-up after the first
             raise KeyboardInterrupt
 
     @staticmethod
     def interrupt_all() -> None:
-        """Interrupt the workers of this process: only those of a terminal's foreground get its Ctrl-C themselves."""
+        """Interrupt the workers of this process. A terminal sends Ctrl-C only to its foreground processes."""
         from multiprocessing import active_children
 
         for child in active_children():

@@ -274,7 +274,7 @@ class TestErrors:
                 lambda d, r: navirl.plot.policy(r, d[0], style="grey"),
                 "`style`: expected one of 'paper', 'screen', 'dark'",
             ),
-            (lambda _d, r: navirl.plot.profile(r, "c0"), r"profile was followed \(sigma_p\), found 'c0'"),
+            (lambda _d, r: navirl.plot.profile(r, "c0"), r"profile likelihood \(sigma_p\), found 'c0'"),
         ],
     )
     def test_expected_errors_are_one_kind_and_name_the_argument(self, demos, reward, call, message):

@@ -1,1 +1,1 @@
-"""The Python door: what ``import navirl_cli as navirl`` offers. The rooms below do the work."""
+"""The Python interface: the public names of ``import navirl_cli as navirl``."""

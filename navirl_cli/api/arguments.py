@@ -1,4 +1,4 @@
-"""From what a user writes in Python to what the rooms take: checked as the options of the command line are."""
+"""Conversion and checks of Python arguments, as for the options of the command line."""
 
 from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
@@ -14,15 +14,15 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def texts(values: str | Collection[str]) -> tuple[str, ...]:
-    """One text or several."""
+    """One text or several, as a tuple."""
     return (values,) if isinstance(values, str) else tuple(values)
 
 
 def one_of(names: Sequence[str], value: str, argument: str) -> str:
-    """A name among those that exist.
+    """One of the known names.
 
     Raises:
-        ArgumentError: It is none of them.
+        ArgumentError: The name is unknown.
     """
     if value not in names:
         raise ArgumentError(unknown(f"`{argument}`", value, names))
@@ -38,7 +38,7 @@ def within(argument: str, value: float, low: float, high: float, *, above: bool 
     """A finite number within bounds.
 
     Raises:
-        ArgumentError: It is not.
+        ArgumentError: It is not finite or not within the bounds.
     """
     if not (isfinite(value) and low <= value <= high and not (above and value == low)):
         least = "above" if above else "from"
@@ -67,7 +67,7 @@ def pairs_in(pair: tuple[str, str] | Sequence[tuple[str, str]]) -> list[tuple[st
     """Pairs of names, of one pair or of several.
 
     Raises:
-        ArgumentError: Something else was given.
+        ArgumentError: The argument has another form.
     """
     several = [pair] if len(pair) == 2 and all(isinstance(one, str) for one in pair) else pair
     found = []

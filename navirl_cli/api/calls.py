@@ -1,4 +1,4 @@
-"""The functions of the door: each composes what a command of the same name does, with the same options."""
+"""The public functions. Each does the work of the command of the same name, with the same options."""
 
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -85,37 +85,37 @@ def extract(
 ) -> Demonstrations:
     """Turn MCAP logs into demonstrations, as ``navirl extract``.
 
-    What is damaged, skipped or left out is warned of (:class:`~navirl_cli.errors.NavirlWarning`) and listed in
-    ``lost``; what is odd is listed in ``notes``.
+    Damaged or skipped data gives a warning (:class:`~navirl_cli.errors.NavirlWarning`) and is listed in ``lost``.
+    ``notes`` lists unusual findings.
 
     Args:
         *logs: MCAP files, rosbag2 folders, folders of recordings, or patterns.
         split: Trials begin at a new "goal", after a "stop", or the log is one trial ("none").
-        participant: Name in place of the log's or the file's.
-        robot_radius: m; grows the map. None: of the log's session record, else 0.3.
+        participant: Name of the participant, instead of the name in the log or of the file.
+        robot_radius: Radius by which the map is inflated, m. None: from the log's session record, else 0.3.
         resolution: Side of the cells, m.
-        rasterizer: How a path becomes cells: "study", "crossed" or "chain".
-        person: Where a person stands, (x, y) m in the map frame, or several of them; in place of the log's people.
-        goal: (x, y) m in the map frame, in place of the log's goals.
+        rasterizer: Rule that turns a path into cells: "study", "crossed" or "chain".
+        person: Position (x, y) of a person, m in the map frame, or several positions; instead of the log's people.
+        goal: Goal (x, y), m in the map frame, instead of the log's goals.
         contact_force: A contact begins above this force, N, and ends below half of it.
         wrench_filter: The force is low-passed below this frequency, Hz.
-        gain: Estimate how fast the robot gives way to a push to the side.
-        topic: A topic, or several, by role, where several topics fit: ``{"wrench": "/ft"}``.
-        map: Map in place of the log's: a Nav2 map YAML beside its pgm or png.
-        frame: Frame of all results, in place of the map's.
-        no_wrench: Ignore forces, or do without them; contact is then unknown.
-        wrench_frame: Frame of the wrench, in place of its header's.
-        time: Time of a message: its "header" stamp, or its receipt ("log").
-        join: Take all logs as pieces of one recording.
-        strict: Refuse a log of which something is lost.
-        executor: Where to work on several logs; threads of this process by default. An executor of processes is
-            faster; create it under ``if __name__ == "__main__":``.
+        gain: Estimate the robot's gain, its velocity per sideways force.
+        topic: Topic of a role, or several topics, if several are possible: ``{"wrench": "/ft"}``.
+        map: Nav2 map YAML beside its pgm or png, instead of the map in the log.
+        frame: Frame of all results, instead of the map's frame.
+        no_wrench: Ignore forces; also for logs without a wrench. Contact is then unknown.
+        wrench_frame: Frame of the wrench, instead of the frame in its header.
+        time: Time of a message: the stamp in its "header", or the time of receipt in the "log".
+        join: Treat all logs as parts of one recording.
+        strict: Refuse damaged logs.
+        executor: Processes several logs in parallel; threads of this process by default. An executor of processes is
+            faster. Create it under ``if __name__ == "__main__":``.
 
     Returns:
         The trials.
 
     Raises:
-        NavirlError: No log gave a demonstration, or an argument cannot be right.
+        NavirlError: No log gave a demonstration, or an argument is invalid.
 
     Example:
         >>> demos = navirl.extract("p01.mcap", "p02.mcap")
@@ -158,7 +158,7 @@ def extract(
 def _extracted(
     found: Recordings, settings: ExtractSettings, options: LoadOptions, map_file: Path | None
 ) -> Demonstrations:
-    """What came out of logs, as its file would have it: numbers do not depend on whether trials went through a file."""
+    """The extracted trials as their file holds them, so that numbers are the same with and without a file."""
     demonstrations = found.demonstrations()
     inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
     said = settings_document(settings, options, map_file)
@@ -176,18 +176,18 @@ def _extracted(
 def inspect(
     *logs: PathLike, topic: Mapping[str, str | Sequence[str]] | None = None, check: bool = False
 ) -> list[Overview]:
-    """What logs hold, and what :func:`extract` would take from them, as ``navirl inspect``.
+    """The content of logs, and the topics that :func:`extract` would use, as ``navirl inspect``.
 
     Args:
         *logs: As in :func:`extract`.
         topic: As in :func:`extract`.
-        check: Read every message: damage inside of chunks shows only then.
+        check: Read every message. This also finds damage inside chunks.
 
     Returns:
         For each recording its topics, the choice for each role, clocks, frames and damage.
 
     Raises:
-        NavirlError: An argument is no log, or a topic does not fit.
+        NavirlError: An argument is not a log, or a topic cannot have its role.
 
     Example:
         >>> navirl.inspect("p01.mcap")[0].needed
@@ -218,35 +218,34 @@ def fit(
 ) -> FittedReward:
     """Learn a navigation reward from demonstrations, as ``navirl fit``.
 
-    A fit that did not converge, and an analysis without an answer, are warned of
-    (:class:`~navirl_cli.errors.NavirlWarning`).
+    A fit that did not converge and an analysis that failed give a warning (:class:`~navirl_cli.errors.NavirlWarning`).
 
     Args:
         demos: Demonstrations, or their file.
-        init: Start: a reward, its file, or values by name.
-        prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init the start
-            too.
-        l2: Regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, except those that the
-            prior knows. 0 for none.
+        init: Initial values: a reward, its file, or values by name.
+        prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
+            initial values.
+        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
+            the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, two starts) or the paper's gradient ascent, "adam".
-        condition: Learn from these conditions only: "force", "joystick", "autonomous"; one or several.
-        cycle: Learn from this cycle only.
-        only_corrected: Learn only from trials in which the person intervened.
-        steps: Learn from "all" steps of a path, or from those during "contact".
+        condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
+        cycle: Use trials of this cycle only.
+        only_corrected: Use only trials in which the person intervened.
+        steps: Use "all" steps of a path, or only those during "contact".
         correct_bias: Subtract the first-order bias of maximum likelihood.
         bootstrap: Fit this many times with participants drawn with replacement.
-        profile: Parameters whose profile likelihood is followed to its 95 % interval.
+        profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
-        seed: Of the bootstrap.
-        executor: Where to compute bootstrap and cross-validation; threads of this process by default. An executor of
-            processes is faster; create it under ``if __name__ == "__main__":``.
+        seed: Seed of the bootstrap.
+        executor: Computes bootstrap and cross-validation in parallel; threads of this process by default. An executor
+            of processes is faster. Create it under ``if __name__ == "__main__":``.
 
     Returns:
         The reward with its covariance and its status.
 
     Raises:
-        NavirlError: Nothing is left to learn from, the partition function is infinite at the start, or arguments
-            exclude each other.
+        NavirlError: No demonstration or step is left, the partition function is infinite at the initial values, or
+            arguments exclude each other.
 
     Example:
         >>> reward = navirl.fit(demos, condition="force", cycle=2)
@@ -305,14 +304,15 @@ def evaluate(
 
     Args:
         demos: Demonstrations, or their file.
-        reward: A reward, its file, values by name of parameter; or several rewards by names of their own.
+        reward: A reward, its file, values by name of parameter; or several rewards by name.
         metrics: Names of metrics, or "all"; the paper's three by default.
-        by: Group by these: "condition", "cycle", "set", "participant"; by the first three by default.
+        by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
-        ranks: Rank demonstrations among the policy's paths.
-        samples: Paths drawn from a policy in each scene.
-        precision: Draw until the Monte Carlo error of each expected value is below this share of it, or of its spread.
-        seed: Of everything drawn by chance.
+        ranks: Rank each demonstration by likelihood among paths sampled from the policy.
+        samples: Number of paths sampled from each policy in each scene.
+        precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
+            deviation.
+        seed: Seed of all random numbers.
 
     Returns:
         Metrics by group; print them, write them, or take :meth:`~navirl_cli.api.results.Evaluation.to_frame`.
@@ -378,7 +378,7 @@ def _warn(lines: Sequence[str], depth: int = 3) -> None:
 
 @contextmanager
 def _workers(executor: Executor | None) -> Iterator[Executor]:
-    """Where to work. Processes would start the user's own script again where they cannot fork."""
+    """The executor: by default threads. Processes that cannot fork would run the user's script again."""
     if executor is not None:
         yield executor
         return

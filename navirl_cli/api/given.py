@@ -1,4 +1,4 @@
-"""What a user gives: demonstrations and rewards as they are, or the files that hold them."""
+"""Demonstrations and rewards from the user's arguments: objects, or the files that hold them."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.fit import warnings
 
 PathLike: TypeAlias = str | Path
-#: A learnt reward, or values by the names of the parameters; what is not named keeps its initial value.
+#: A learnt reward, or values by the names of the parameters; the other parameters keep their initial values.
 AnyReward: TypeAlias = LearntReward | Reward | Mapping[str, float]
 
 
@@ -29,7 +29,7 @@ def read_demonstrations(path: PathLike) -> Demonstrations:
         The trials.
 
     Raises:
-        NavirlError: The file is missing, or is no demonstrations file, or holds none.
+        NavirlError: The file is missing, is not a demonstrations file, or holds no demonstrations.
     """
     path = Path(path)
     document = read_json(path, "demonstrations")
@@ -56,7 +56,7 @@ def read_reward(path: PathLike) -> FittedReward:
         The reward.
 
     Raises:
-        NavirlError: The file is missing, or is no reward file.
+        NavirlError: The file is missing or is not a reward file.
     """
     path = Path(path)
     document = read_json(path, "reward")
@@ -65,10 +65,10 @@ def read_reward(path: PathLike) -> FittedReward:
 
 
 def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Demonstration]:
-    """Demonstrations, read where a file is named.
+    """Demonstrations; a file is read.
 
     Raises:
-        DemonstrationError: There is none.
+        DemonstrationError: There are no demonstrations.
     """
     if isinstance(demos, str | Path):
         return read_demonstrations(demos)
@@ -78,12 +78,12 @@ def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Dem
 
 
 def sources_behind(demos: Sequence[Demonstration]) -> Sequence[Input]:
-    """The files behind demonstrations, where they are known."""
+    """The input files of demonstrations, if they are known."""
     return demos.sources() if isinstance(demos, Demonstrations) else ()
 
 
 def files_behind(reward: object) -> list[Input]:
-    """The file of a reward, where there is one."""
+    """The file of a reward, if it has one."""
     if isinstance(reward, str | Path):
         return [Input.of(Path(reward))]
     file = reward.file if isinstance(reward, FittedReward) else None
@@ -91,7 +91,7 @@ def files_behind(reward: object) -> list[Input]:
 
 
 def learnt_in(reward: PathLike | LearntReward) -> LearntReward:
-    """A learnt reward, read where a file is named."""
+    """A learnt reward; a file is read."""
     return read_reward(reward) if isinstance(reward, str | Path) else reward
 
 

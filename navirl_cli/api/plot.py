@@ -1,4 +1,4 @@
-"""Figures, as ``navirl plot`` draws them: on axes of yours, or on a new figure.
+"""Figures, as ``navirl plot`` draws them: on your axes, or on a new figure.
 
 Every function draws in the style of the command line and returns the axes. Without ``axes`` it opens a figure through
 pyplot: a notebook shows it at the end of the cell, ``matplotlib.pyplot.show()`` in a window. With ``output`` it writes
@@ -46,11 +46,11 @@ __all__ = ["actions", "convergence", "forces", "paths", "policy", "profile", "pr
 class PageOptions(TypedDict, total=False):
     """Options of every figure."""
 
-    #: As wide as a page of two columns (7.16 in), not one (3.5 in).
+    #: Width of a page with two columns (7.16 in) instead of one column (3.5 in).
     wide: bool
     #: "paper", "screen" (twice the pixels) or "dark".
     style: str
-    #: File to write: .png, .pdf or .svg, with embedded fonts; nothing is shown then.
+    #: File to write: .png, .pdf or .svg, with embedded fonts. The figure is then not shown.
     output: PathLike | None
     #: Replace an existing file.
     force: bool
@@ -67,15 +67,15 @@ def paths(
 
     Args:
         demos: Demonstrations, or their file.
-        axes: Where to draw; a new figure by default.
-        crop: Show no more of the map than what surrounds the paths.
+        axes: Axes to draw on; a new figure by default.
+        crop: Show only the surroundings of the paths.
         **page: As in :class:`PageOptions`.
 
     Returns:
         The axes.
 
     Raises:
-        NavirlError: There is no demonstration, or the figure cannot be written.
+        NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
     return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
@@ -93,18 +93,18 @@ def policy(
     demos: Sequence[Demonstration] = (),
     **page: Unpack[PageOptions],
 ) -> "Axes":
-    """Draw where a policy leads: expected visits of every cell (the paper's Fig. 8, left).
+    """Draw the expected visits of every cell under a policy (the paper's Fig. 8, left).
 
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
-        axes: Where to draw; a new figure by default.
-        crop: Show no more of the map than what surrounds the likely paths.
+        axes: Axes to draw on; a new figure by default.
+        crop: Show only the surroundings of the likely paths.
         overlay: Draw paths over the map: "demos", "samples", or both.
-        samples: Number of paths that are drawn from the policy.
+        samples: Number of paths sampled from the policy.
         seed: The same seed gives the same paths.
-        demos: Demonstrations for the overlay, of which those in the same scene are drawn; the demonstration alone by
-            default.
+        demos: Demonstrations for the overlay; those in the same scene are drawn. By default the given demonstration
+            alone.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -189,8 +189,8 @@ def properties(
 
     Args:
         demos: Demonstrations, or their file.
-        reward: Adds bars of the learnt paths, in the groups that it was learnt from, or in all if that is not known.
-        samples: Paths drawn from the policy in each scene.
+        reward: Adds bars of the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
         **page: As in :class:`PageOptions`.
 
@@ -198,7 +198,7 @@ def properties(
         The axes of the three panels.
 
     Raises:
-        NavirlError: There is no demonstration, or the figure cannot be written.
+        NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
@@ -211,11 +211,11 @@ def properties(
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
-    """Draw how the person pushed in a trial: forces over time with contacts, and as arrows along the path.
+    """Draw the forces of a trial: over time with contacts, and as arrows along the path.
 
     Args:
         demonstration: The trial.
-        crop: Show no more of the map than what surrounds the path.
+        crop: Show only the surroundings of the path.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -236,13 +236,13 @@ def ranks(
     seed: int = 0,
     **page: Unpack[PageOptions],
 ) -> "Axes":
-    """Draw the ranks of demonstrations among the policy's own paths: uniform where the policy is right.
+    """Draw the ranks of demonstrations among paths of the policy: uniform if the policy is right.
 
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
-        axes: Where to draw; a new figure by default.
-        samples: Paths drawn from the policy in each scene.
+        axes: Axes to draw on; a new figure by default.
+        samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
         **page: As in :class:`PageOptions`.
 
@@ -259,7 +259,7 @@ def ranks(
 
 
 def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) -> "list[Axes]":
-    """Draw how a fit came to its maximum: log-likelihood and parameters over the iterations.
+    """Draw log-likelihood and parameters over the iterations of a fit.
 
     Args:
         reward: A learnt reward, or its file.
@@ -294,7 +294,7 @@ def profile(
     Args:
         reward: A reward that was learnt with ``profile=NAME``, or its file.
         name: The parameter.
-        axes: Where to draw; a new figure by default.
+        axes: Axes to draw on; a new figure by default.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -307,7 +307,9 @@ def profile(
     found = next((one for one in learnt.profiles if one.name == name), None)
     if found is None:
         known = ", ".join(one.name for one in learnt.profiles) or "none"
-        raise ArgumentError(f"expected a parameter whose profile was followed ({known}), found {name!r}; use `profile`")
+        raise ArgumentError(
+            f"expected a parameter with a profile likelihood ({known}), found {name!r}; fit again with `profile`"
+        )
     unit = next(parameter.unit for parameter in learnt.reward.parameters if parameter.name == name)
     height_in = _width_in(page) * ASPECT
     return _drawn(lambda panels: draw_profile(panels[0], found, unit), _own(axes), page, height_in=height_in)[0]
@@ -358,7 +360,7 @@ def _cells(
     seed: int,
     demos: Sequence[Demonstration],
 ) -> CellOptions:
-    """What all figures of a scene share; a cropped one shows the same window in all of them."""
+    """Common options of all figures of a scene; cropped figures have the same view."""
     wanted = {one_of(("demos", "samples"), one, "overlay") for one in texts(overlay)}
     overlays = overlays_of(
         alike(demos or [view.demonstration], view.demonstration) if "demos" in wanted else (),
@@ -370,6 +372,6 @@ def _cells(
 
 
 def _taught(reward: PathLike | AnyReward | None, demonstrations: Sequence[Demonstration]) -> set[str]:
-    """Groups that a reward was learnt from; all where that is not known."""
+    """Groups from which a reward was learnt; all if these are unknown."""
     learnt = learnt_in(reward) if isinstance(reward, str | Path | LearntReward) else None
     return {group_of(one) for one in demonstrations if learnt is None or one.id in learnt.demonstrations}

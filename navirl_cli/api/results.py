@@ -1,4 +1,4 @@
-"""What the door returns: tables and arrays that can be printed, written, and handed to pandas."""
+"""Results of the public functions: tables and arrays to print, write, and convert to pandas."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -52,14 +52,14 @@ def frame_of(records: Sequence[Mapping[str, Any]]) -> "DataFrame":
 class Demonstrations(Sequence[Demonstration]):
     """Trials, in order: a sequence of :class:`~navirl_cli.demos.demonstration.Demonstration`.
 
-    A slice has the same sources; any other choice (a list, say) serves as well wherever demonstrations are asked for.
+    A slice has the same sources. A list of trials is also accepted wherever demonstrations are expected.
 
     Attributes:
-        inputs: Name and SHA-256 of the files that the trials were made from.
-        settings: The choices of the extraction.
-        notes: What a reader of the results should know, one text a fact.
-        lost: What was damaged, skipped or left out.
-        gain: How fast the robot gives way to a push, as in demos.json; None where it was not asked for.
+        inputs: Name and SHA-256 of the input files.
+        settings: The settings of the extraction.
+        notes: Remarks on the results, one text for each.
+        lost: Damaged or skipped data.
+        gain: The robot's gain, as in demos.json; None if it was not requested.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Demonstrations(Sequence[Demonstration]):
         return self.inputs if self._file is None else (self._file,)
 
     def to_frame(self) -> "DataFrame":
-        """The table of trials, a row a trial; missing values are None or NaN.
+        """The table of trials, one row for each; missing values are None or NaN.
 
         Returns:
             A pandas DataFrame.
@@ -130,17 +130,17 @@ class Demonstrations(Sequence[Demonstration]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedReward(LearntReward):
-    """A learnt reward, with everything that its file holds.
+    """A learnt reward, with the content of its file.
 
-    Beside the attributes of :class:`~navirl_cli.artefacts.rewards.LearntReward`:
+    Attributes besides those of :class:`~navirl_cli.artefacts.rewards.LearntReward`:
 
     Attributes:
         document: The content of the reward file.
-        notes: What a reader of the numbers should know, one text a fact.
-        lost: Analyses that were asked for and have no answer, with the reason.
-        fit: The fit itself; None of a reward that was read from a file.
-        analyses: Answers to what was asked besides; None of a reward that was read from a file.
-        file: Name and SHA-256 of the file; None of a reward that was not read.
+        notes: Remarks on the numbers, one text for each.
+        lost: Requested analyses that failed, with the reason.
+        fit: The fit; None for a reward that was read from a file.
+        analyses: Results of the requested analyses; None for a reward that was read from a file.
+        file: Name and SHA-256 of the file; None for a reward that was not read from a file.
     """
 
     document: Mapping[str, Any] | None = None
@@ -178,7 +178,7 @@ class FittedReward(LearntReward):
         return list((self.document or {"parameters": []})["parameters"])
 
     def to_frame(self) -> "DataFrame":
-        """The parameters, a row each: name, unit, value, standard errors, whether the data identify it.
+        """The parameters, one row for each: name, unit, value, standard errors, whether the data identify it.
 
         Returns:
             A pandas DataFrame.
@@ -206,10 +206,10 @@ class ScenePolicy:
     """The policy of a reward in the scene of one demonstration, as arrays over the map.
 
     Attributes:
-        demonstration: The trial whose map, people, start and goal make the scene.
+        demonstration: The trial that gives map, people, start and goal of the scene.
         reward: The reward.
         scene: The states, start, goal, people and nominal path.
-        policy: Values and probabilities by state, and the means to solve for visits.
+        policy: Values and probabilities by state.
     """
 
     demonstration: Demonstration
@@ -229,7 +229,7 @@ class ScenePolicy:
 
     @cached_property
     def visits_by_state(self) -> FloatArray:
-        """(n,) the same by state."""
+        """(n,) expected visits by state."""
         return self.policy.visits_from(self.scene.start)
 
     @cached_property
@@ -269,7 +269,7 @@ class ScenePolicy:
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of a metrics file with one value a column: those by metric as METRIC_NAME, measured ones as METRIC."""
+    """A row of a metrics file, one value in each column: METRIC_NAME for values by metric, METRIC for measured ones."""
     columns: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
@@ -289,9 +289,9 @@ class Evaluation:
 
     Attributes:
         comparison: Mean and spread by group and type of path; every demonstration as driven.
-        metrics: The metrics that were asked for.
+        metrics: The requested metrics.
         pairs: Groups compared by participant.
-        ranks: Ranks of the demonstrations among the policy's paths.
+        ranks: Ranks of the demonstrations among paths of the policy.
         document: The content of a metrics file.
     """
 
@@ -314,14 +314,14 @@ class Evaluation:
         Args:
             table: "groups": a row for each group and type of path, with the columns METRIC_mean and
                 METRIC_standard_deviation;
-                "demonstrations": a row for each demonstration as driven, a column a metric;
+                "demonstrations": a row for each demonstration as driven, a column for each metric;
                 "pairs": a row for each pair and metric; "ranks": a row for each ranked demonstration.
 
         Returns:
             A pandas DataFrame in the units of the metrics' names.
 
         Raises:
-            NavirlError: pandas is not installed, or there is no such table.
+            NavirlError: pandas is not installed, or the table does not exist.
         """
         if table not in TABLES:
             raise ArgumentError(unknown("`table`", table, TABLES))

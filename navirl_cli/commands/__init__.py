@@ -1,1 +1,1 @@
-"""One thin file a subcommand: parse, call, echo."""
+"""One thin file for each subcommand: parse, call, print."""

@@ -1,6 +1,6 @@
-"""What the shell completes: names that the files at hand hold, and lists of names.
+"""Shell completion: names from the files on the command line, and lists of names.
 
-Completion never raises and never prints: where something cannot be read there is nothing to propose.
+Completion never raises and never prints. A file that cannot be read gives no proposals.
 """
 
 import os
@@ -15,19 +15,19 @@ from warnings import catch_warnings, simplefilter
 import click
 from click.shell_completion import BashComplete, CompletionItem, add_completion_class
 
-#: What bash reads as more than itself.
+#: Characters with a special meaning in bash.
 _SPECIAL, _ESCAPED = re.compile(r"[^\w,./:=@%+-]"), r"\\\g<0>"
-#: What click asks for proposals: the context with the words so far, the parameter, and the word at the cursor.
+#: click's function for proposals: of the context with the words so far, the parameter, and the word at the cursor.
 Complete: TypeAlias = "Callable[[click.Context, click.Parameter, str], list[CompletionItem[str]]]"
 
 
 def use_whole_words() -> None:
-    """Have :class:`WholeWords` complete for bash."""
+    """Use :class:`WholeWords` for completion in bash."""
     add_completion_class(WholeWords)
 
 
 def _proposed(names: Callable[[click.Context, str], Iterable[str]]) -> Complete:
-    """The names that begin with the word at the cursor; none where anything goes wrong."""
+    """The names that begin with the word at the cursor; none after any error."""
 
     def complete(ctx: click.Context, _param: click.Parameter, incomplete: str) -> "list[CompletionItem[str]]":
         with suppress(Exception), redirect_stdout(StringIO()), redirect_stderr(StringIO()), catch_warnings():
@@ -39,7 +39,7 @@ def _proposed(names: Callable[[click.Context, str], Iterable[str]]) -> Complete:
 
 
 def _files(ctx: click.Context, name: str) -> list[Path]:
-    """The files of an argument; click leaves them among the other words while an option lacks its value."""
+    """The files of an argument. While an option lacks its value, click keeps them among the other words."""
     found = ctx.params.get(name) or ctx.args
     return [Path(one) for one in ([found] if isinstance(found, Path) else found)]
 
@@ -70,7 +70,7 @@ def parameters(_ctx: click.Context, _incomplete: str) -> Iterator[str]:
 
 
 def initial(ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem[str]]":
-    """A list of parameters with each of those that it lacks, or a file."""
+    """A list of parameters extended by each missing one, or a file."""
     before, comma, name = incomplete.rpartition(",")
     named = [part.partition("=")[0] for part in before.split(",")]
     lacking = [one for one in parameters(ctx, param, name) if one.value not in named]
@@ -80,7 +80,7 @@ def initial(ctx: click.Context, param: click.Parameter, incomplete: str) -> "lis
 
 @_proposed
 def metrics(_ctx: click.Context, incomplete: str) -> Iterator[str]:
-    """A list of metrics with each of those that it lacks, or all of them."""
+    """A list of metrics extended by each missing one, or all."""
     from navirl_cli.evaluation.metrics import BY_NAME
 
     before, comma, _ = incomplete.rpartition(",")
@@ -91,7 +91,7 @@ def metrics(_ctx: click.Context, incomplete: str) -> Iterator[str]:
 
 @_proposed
 def topics(ctx: click.Context, _incomplete: str) -> Iterator[str]:
-    """ROLE=/topic for all topics of the logs on the command line that can have the role; ROLE= without a log."""
+    """ROLE=/topic for all topics of the logs on the command line that can have the role; ROLE= if no log is given."""
     from navirl_cli.logs.messages.reader import scan
     from navirl_cli.logs.roles.topics import ROLES, topics_of
     from navirl_cli.logs.sources import sources_of
@@ -107,11 +107,11 @@ class WholeWords(BashComplete):
     """Completion for bash, which splits words at equals signs and reads blanks and quotation marks in proposals."""
 
     name: ClassVar[str] = "bash"
-    #: What stands before the part of the word that bash replaces.
+    #: The text before the part of the word that bash replaces.
     kept: str = ""
 
     def get_completion_args(self) -> tuple[list[str], str]:
-        """The words before the cursor and the word at it, with those that bash split put together again."""
+        """The words before the cursor and the word at it, with the words that bash split joined again."""
         before, incomplete = super().get_completion_args()
         words: list[str] = []
         for part in (*before, incomplete):
@@ -121,7 +121,7 @@ class WholeWords(BashComplete):
                 self.kept = ""
             else:
                 words.append(f"{self.kept}{part}")
-        if incomplete == "=":  # bash puts the proposal behind it
+        if incomplete == "=":  # bash inserts the proposal after it
             self.kept = words[-1]
         return words[:-1], words[-1]
 

@@ -1,4 +1,4 @@
-"""``navirl evaluate``: what demonstrated, learnt and baseline paths are like, and how groups of them differ."""
+"""``navirl evaluate``: metrics of demonstrated, learnt and baseline paths, and comparisons of groups."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -204,7 +204,7 @@ def _list_metrics(how: Format, *, as_json: bool) -> None:
 
 
 def _check_arguments(rewards: Sequence[Path], pairs: Sequence[tuple[str, str]], *, ranks: bool) -> None:
-    """Refuse what cannot be right whatever the files hold."""
+    """Refuse options that are invalid whatever the files hold."""
     if ranks and len(rewards) != 1:
         raise click.UsageError("--ranks needs one --reward.")
     stems = [path.stem for path in rewards]

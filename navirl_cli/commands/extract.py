@@ -143,16 +143,16 @@ def extract(
 ) -> None:
     """Turn MCAP logs into demonstrations.
 
-    LOG is an MCAP file, also one that is compressed with zstd or lz4; a rosbag2 folder; a folder of recordings; or a
-    pattern. Topics are found by message type; navirl inspect shows which. Each log is split into trials. In each trial
-    the contacts are detected, in which a person pushes the robot, and the path becomes cells of a grid.
+    LOG is an MCAP file (also compressed with zstd or lz4), a rosbag2 folder, a folder of recordings, or a pattern.
+    Topics are found by message type; navirl inspect shows which. Each log is split into trials. In each trial,
+    contacts (a person pushes the robot) are detected, and the path becomes cells of a grid.
 
     The map should be the one in which the robot drove. A plain map is inflated by the robot's radius; a costmap is
     inflated already.
 
-    Only the force of the wrench is used, without the sensor's slowly changing bias and in the robot's base frame. A
-    force does not depend on where the sensor is mounted; a torque does, by the lever arm. A push on the robot's body
-    that does not pass through the sensor is not measured.
+    Only the force of the wrench is used, in the robot's base frame. The sensor's slowly changing bias is subtracted.
+    Unlike a torque, a force does not depend on where the sensor is mounted. A push on the robot's body that does not
+    pass through the sensor is not measured.
     """
     chosen = topics_by_role(topics)
     if no_wrench and (gain or wrench_frame or "wrench" in chosen):

@@ -79,8 +79,8 @@ from navirl_cli.reports.fit import remarks, report, warnings
         "--prior",
         "prior_file",
         type=FilePath,
-        help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init also the initial "
-        "values.",
+        help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init it also "
+        "gives the initial values.",
     ),
     click.option(
         "--l2",
@@ -100,7 +100,7 @@ from navirl_cli.reports.fit import remarks, report, warnings
     click.option(
         "--correct-bias",
         is_flag=True,
-        help="Subtract the first-order bias of maximum likelihood, which few demonstrations make large for a_p.",
+        help="Subtract the first-order bias of maximum likelihood. It is large for a_p with few demonstrations.",
     ),
 )
 @section(
@@ -186,7 +186,7 @@ def fit(
 
 
 def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: float, method: Method) -> Fit:
-    """The fit, with a bar."""
+    """The fit, with a progress bar."""
     with progress_bar("fit") as update:
         return fit_reward(
             evidence,

@@ -39,8 +39,8 @@ def import_study(runs: Path, output: Path, as_json: bool, force: bool) -> None:
     """Turn the published user study (RUNS) into logs.
 
     RUNS is the archive runs.tar.gz that the paper's authors publish, the folder into which it was unpacked, or the
-    folder of one participant. The study has neither times nor forces: positions are laid out at 0.4 m/s, and extract
-    needs --no-wrench. Otherwise the logs are what a robot would have recorded. The metadata record navirl.published
+    folder of one participant. The study has neither times nor forces. Times follow from a speed of 0.4 m/s, and extract
+    needs --no-wrench. Otherwise the logs are as a robot would have recorded them. The metadata record navirl.published
     holds the published cells. The study's pickles are parsed as data and never executed.
     """
     from navirl_cli.published.log import write_logs

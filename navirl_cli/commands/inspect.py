@@ -1,4 +1,4 @@
-"""``navirl inspect``: what a log holds."""
+"""``navirl inspect``: the content of logs."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from navirl_cli.reports.overview import overview_document, overview_report
 @click.command(
     cls=Command,
     examples=[
-        Example("Topics of a log, and the topics that extract would take", "navirl inspect p01.mcap"),
+        Example("Topics of a log, and the topics that extract would use", "navirl inspect p01.mcap"),
         Example("All logs of a folder, with a check of every message", "navirl inspect logs --check"),
         Example("For a program", "navirl inspect p01.mcap --topic wrench=/wrench --json"),
     ],
@@ -35,17 +35,17 @@ from navirl_cli.reports.overview import overview_document, overview_report
 @section(
     "Input",
     topic_option,
-    click.option("--check", is_flag=True, help="Read every message, which also finds damage inside of chunks."),
+    click.option("--check", is_flag=True, help="Read every message. This also finds damage inside chunks."),
 )
 @section("Output", json_option)
 def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: bool, as_json: bool) -> None:
-    """Show what logs hold, and what extract would take from them.
+    """Show the content of logs, and the topics that extract would use.
 
     LOG is an MCAP file, a rosbag2 folder, a folder of recordings, or a pattern. The output lists duration, clocks and
-    damage; for every topic its type, number of messages, rate and gaps; the topics that extract would take; and what
-    is missing, with the option that supplies it.
+    damage; for every topic its type, number of messages, rate and gaps; the topics that extract would use; and missing
+    data, with the option that supplies it.
 
-    A gap is a pause in a regular topic of at least half a second and five periods; rates leave gaps out. The stamp
+    A gap is a pause in a regular topic of at least half a second and five periods. Rates exclude gaps. The stamp
     lead is the header's stamp minus the time of receipt, relative to the odometry. It is near 0 for topics of the same
     clock; tf is often stamped ahead on purpose.
     """

@@ -14,7 +14,7 @@ class LazyGroup(WithExamples, click.Group):
     """A group that imports a command when it is called.
 
     Args:
-        known: By name of the command, in the order of the help: the module that holds it, under its name with _ for -,
+        known: By name of the command, in the order of the help: the module that holds it (function name with _ for -)
             and its summary.
     """
 
@@ -36,7 +36,7 @@ class LazyGroup(WithExamples, click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """List the commands where a name is unknown, and propose the near ones."""
+        """For an unknown name, list the commands and propose similar ones."""
         if args and args[0] not in self.known and not args[0].startswith("-") and not ctx.resilient_parsing:
             ctx.fail(unknown("command", args[0], self.known))
         return super().resolve_command(ctx, args)

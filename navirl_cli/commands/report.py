@@ -1,4 +1,4 @@
-"""``navirl report``: one page on demonstrations and what was learnt from them, to send to a colleague."""
+"""``navirl report``: one page on demonstrations and the reward learnt from them."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

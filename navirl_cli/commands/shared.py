@@ -1,4 +1,4 @@
-"""What several commands have in common: options, tables, progress bars, and the end of a run."""
+"""Shared parts of several commands: options, tables, progress bars, and the end of a run."""
 
 import json
 import sys
@@ -34,7 +34,7 @@ topic_option = click.option(
     multiple=True,
     type=RoleTopic(),
     shell_complete=completion.topics,
-    help="Topic of a role, where several topics fit, e.g. wrench=/ft; repeatable.",
+    help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
 )
 
 
@@ -50,7 +50,7 @@ def samples_option(default: int = 1000) -> Callable[[Function], Function]:
 
 
 def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ...]]:
-    """What ``--topic`` was given as."""
+    """The topics by role from ``--topic``."""
     chosen: dict[str, tuple[str, ...]] = {}
     for role, topic in topics:
         chosen[role] = (*chosen.get(role, ()), topic)
@@ -58,11 +58,11 @@ def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ..
 
 
 def demonstrations_in(path: Path) -> list[Demonstration]:
-    """The demonstrations of a file that holds some.
+    """The demonstrations of a file; an error if it holds none.
 
     Raises:
         DemonstrationError: It holds none.
-        ArtefactError: It is no demonstrations file.
+        ArtefactError: The file is not a demonstrations file.
     """
     demonstrations = read_demonstrations(path)
     if not demonstrations:
@@ -77,7 +77,7 @@ def output_option(what: str, *endings: str, required: bool = True) -> Callable[[
 
 
 def check_output(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
-    """Refuse before any work a file that cannot be written, or that would replace what is read.
+    """Refuse, before any work, an output file that cannot be written or that is an input.
 
     Raises:
         UsageError: It is one of the inputs.
@@ -105,7 +105,7 @@ def echo(text: str) -> None:
 
 
 def merged(lines: Iterable[str]) -> list[str]:
-    """Lines ``name: text`` with the names of equal texts put together, each where it first stands."""
+    """Lines ``name: text``, with the names of equal texts joined at the first of them."""
     names: dict[str, list[str]] = {}
     for line in lines:
         name, _, text = line.partition(": ")
@@ -114,12 +114,12 @@ def merged(lines: Iterable[str]) -> list[str]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names, but not more than a line takes."""
+    """Names, at most one line of them."""
     return ", ".join(names) if len(names) < 5 else f"{names[0]} and {len(names) - 1} others"
 
 
 def finish(lost: Sequence[str]) -> None:
-    """List what was lost or skipped and exit with 3, or return where nothing was."""
+    """List lost or skipped data and exit with 3; return if there is none."""
     for line in lost:
         say(line)
     if lost:
@@ -128,13 +128,13 @@ def finish(lost: Sequence[str]) -> None:
 
 @contextmanager
 def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr over the bytes of one log after the other, where stderr is a terminal.
+    """A progress bar over the bytes of logs in sequence, if stderr is a terminal.
 
     Args:
-        label: What goes on.
+        label: The present work.
 
     Yields:
-        A function that takes the bytes done and the bytes in all.
+        A function that takes the bytes done and the total bytes.
     """
     if not sys.stderr.isatty():
         yield lambda _done, _total: None
@@ -152,14 +152,14 @@ def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[int, str], None]]:
-    """A bar on stderr, where stderr is a terminal.
+    """A progress bar, if stderr is a terminal.
 
     Args:
-        label: What goes on.
-        length: Number of steps, or None where it is not known.
+        label: The present work.
+        length: Number of steps, or None if it is not known.
 
     Yields:
-        A function that takes the number of steps done and a word on the present one.
+        A function that takes the number of steps done and a short text on the present one.
     """
     if not sys.stderr.isatty():
         yield lambda _done, _word: None
@@ -178,7 +178,7 @@ def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[in
 
 @contextmanager
 def _finished(bar: Any) -> Iterator[Any]:
-    """A bar whose line ends and gives the cursor back, also after an interrupt while it is drawn first."""
+    """A bar that ends its line and restores the cursor, also after an interrupt during its first drawing."""
     try:
         yield bar.__enter__()
     finally:

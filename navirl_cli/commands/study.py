@@ -47,7 +47,7 @@ REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demo
     cls=Command,
     examples=[
         Example("Logs with session records", "navirl study p01.mcap p02.mcap p03.mcap -o study"),
-        Example("Demonstrations that were extracted before", "navirl study demos.json --samples 100 -o study"),
+        Example("Demonstrations extracted before", "navirl study demos.json --samples 100 -o study"),
     ],
 )
 @logs_argument
@@ -131,17 +131,17 @@ def study(
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What the user gave, read."""
+    """The content of the user's files."""
 
     demonstrations: list[Demonstration]
     logs: list[str]
     inputs: list[Input]
-    #: Times in which the course was completed, s, by modality and participant.
+    #: Completion times, s, by modality and participant.
     completion_s: dict[str, dict[str, tuple[float, ...]]]
     #: Published paths and whether our cells are the same, and whose they are.
     cells: list[tuple[str, bool]]
     published: set[str]
-    #: What is odd ("name: text"), and what was lost.
+    #: Notes ("name: text"), and lost data.
     notes: list[str]
     lost: list[str]
 
@@ -168,7 +168,7 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
 
 
 def _check_files(output: Path, *, force: bool) -> None:
-    """Refuse early what could not be written at the end.
+    """Check early that all results can be written.
 
     Raises:
         ArtefactError: A file exists already, or cannot be written.
@@ -182,7 +182,7 @@ def _check_files(output: Path, *, force: bool) -> None:
 
 
 def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[float, ...]]]:
-    """Times in which the course was completed, s, by modality and participant."""
+    """Completion times, s, by modality and participant."""
     times: dict[str, dict[str, tuple[float, ...]]] = {}
     for result in results:
         participant = result.demonstrations[0].participant

@@ -1,4 +1,4 @@
-"""Types of options and arguments: what their words may be, and how the shell completes them."""
+"""Types of options and arguments: valid words and shell completion."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -14,10 +14,10 @@ FilePath = click.Path(path_type=Path)
 
 
 class Choice(click.Choice[str]):
-    """One of several words; for another one, the near ones are proposed."""
+    """One of several words; similar words are proposed for an unknown one."""
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:  # noqa: ARG002
-        """What there is, and what was meant."""
+        """The valid words, and similar ones."""
         return unknown("", value, self.choices)
 
 
@@ -40,7 +40,7 @@ class RoleTopic(click.ParamType):  # type: ignore[type-arg]
 
 
 class Number(click.FloatRange):
-    """A finite number within bounds: click's own takes nan, which no bound stops."""
+    """A finite number within bounds. click's own type accepts nan."""
 
     name = "number"
 
@@ -82,7 +82,7 @@ class OutputPath(click.Path):
         self.endings = tuple(endings)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Refuse an ending that is no format."""
+        """Refuse an ending without a format."""
         path = Path(fsdecode(super().convert(value, param, ctx)))
         if path.suffix.lower() not in self.endings:
             *others, last = self.endings

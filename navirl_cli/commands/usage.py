@@ -1,4 +1,4 @@
-"""How the command line speaks: help with options in sections and examples, and arguments in messages as options."""
+"""Help and messages of the command line: options in sections, examples, and arguments shown as options."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -18,19 +18,19 @@ _ARGUMENT = re.compile(r"`([a-z][a-z0-9_]*)`")
 
 
 def as_options(text: str) -> str:
-    """A message of the rooms below, which name arguments, in the words of the command line.
+    """A message with its arguments shown as options.
 
     Args:
         text: With names of arguments between backticks, as in "name it with `wrench_frame`".
 
     Returns:
-        The same with options, as in "name it with --wrench-frame". Backticks around anything else stay.
+        The same with options, as in "name it with --wrench-frame". Other text in backticks is unchanged.
     """
     return _ARGUMENT.sub(lambda match: "--" + match[1].replace("_", "-"), text)
 
 
 class Example(NamedTuple):
-    """A command that a reader can copy, and what it is for."""
+    """A command that a reader can copy, and its purpose."""
 
     purpose: str
     line: str
@@ -56,14 +56,14 @@ class WithExamples(click.Command):
             for purpose, line in self.examples:
                 formatter.write_text(f"{purpose}:")
                 formatter.indent()
-                formatter.write_text(f"\b\n{line}")  # never broken: it is to be copied
+                formatter.write_text(f"\b\n{line}")  # never wrapped, because readers copy it
                 formatter.dedent()
 
 
 class Command(WithExamples):
-    """A command whose help shows options in sections, as :func:`section` puts them.
+    """A command whose help shows options in sections, as set by :func:`section`.
 
-    An :class:`~navirl_cli.errors.ArgumentError` is an error of usage, since its words cannot be right.
+    An :class:`~navirl_cli.errors.ArgumentError` is an error of usage.
     """
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -85,10 +85,10 @@ class Command(WithExamples):
 
 
 def section(title: str, *options: Callable[[Any], Any]) -> Callable[[Function], Function]:
-    """Options that stand together in the help, as one decorator.
+    """Options of one section of the help, as one decorator.
 
     Args:
-        title: Of the section.
+        title: Title of the section.
         options: Decorators, as of :func:`click.option`, in the order of the help.
     """
 

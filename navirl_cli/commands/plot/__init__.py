@@ -1,4 +1,4 @@
-"""``navirl plot``: figures of demonstrations and of what was learnt from them."""
+"""``navirl plot``: figures of demonstrations and learnt rewards."""
 
 import click
 
@@ -26,7 +26,9 @@ FIGURES = {
     known={name: (f"{__name__}.{file}", summary) for name, (file, summary) in FIGURES.items()},
     examples=[
         Example("Demonstrated paths", "navirl plot paths demos.json -o paths.pdf"),
-        Example("Where the learnt policy leads", "navirl plot policy demos.json --reward reward.json -o policy.pdf"),
+        Example(
+            "Expected visits of the learnt policy", "navirl plot policy demos.json --reward reward.json -o policy.pdf"
+        ),
     ],
 )
 def plot() -> None:

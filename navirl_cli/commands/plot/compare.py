@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def _group_option(count: str) -> Callable[[Function], Function]:
-    """``--group`` with a word on how many."""
+    """``--group`` with a text on how many."""
     return click.option(
         "--group",
         "groups",

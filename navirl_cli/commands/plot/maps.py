@@ -128,7 +128,7 @@ def scene_options(function: Function) -> Function:
 def policy(page: Page, sight: Sight) -> None:
     """Draw expected visits of every cell under the learnt policy.
 
-    As in Fig. 8 of the paper, left: where the policy leads in the scene of one trial.
+    As in Fig. 8 of the paper, left, in the scene of one trial.
     """
     from navirl_cli.figures.cells import draw_policy
 

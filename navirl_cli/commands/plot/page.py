@@ -65,7 +65,7 @@ class Page:
         panels: int = 1,
         columns: int | None = None,
     ) -> None:
-        """Open a figure, draw on its axes, save it; without a given height it is as high as its maps need."""
+        """Open a figure, draw on its axes, save it; by default its height follows from its maps."""
         from navirl_cli.figures.sheet import new_figure
 
         with self.look():
@@ -75,7 +75,7 @@ class Page:
 
 
 def page_options(function: Function) -> Function:
-    """Options of every figure, as argument ``page``; a file that cannot be written is refused before any work."""
+    """Options of every figure, as argument ``page``; a file that cannot be written is refused early."""
 
     @wraps(function)
     def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
