@@ -57,7 +57,7 @@ def test_every_step_against_a_plain_loop(bounds, free):
     assert ((places >= bounds[0]) & (places <= bounds[1])).all()
 
 
-def test_the_rate_falls_after_every_hundred_steps_and_the_means_begin_anew():
+def test_the_rate_falls_after_every_hundred_steps_and_the_means_are_reset():
     # On a slope of constant steepness every step of Adam is as long as the learning rate.
     places, values, ended = ascend(lambda x: (1e3 * x[0], np.array([1e3, 0.0])), np.zeros(2), FAR, BOTH)
     lengths = np.diff(places[:, 0])
@@ -68,7 +68,7 @@ def test_the_rate_falls_after_every_hundred_steps_and_the_means_begin_anew():
     assert values == pytest.approx(1e3 * places[:, 0])
 
 
-def test_it_stops_where_neither_value_nor_gradient_moves():
+def test_it_stops_when_value_and_gradient_are_below_their_tolerances():
     # Within 0.05 of the top of -x^2 the gradient is below 0.1; the step before changed the value by less than 0.01.
     places, values, ended = ascend(
         lambda x: (-float(x[0] ** 2), np.array([-2 * x[0], 0.0])), np.array([1.0, 5.0]), FAR, BOTH
@@ -80,7 +80,7 @@ def test_it_stops_where_neither_value_nor_gradient_moves():
 
 
 @pytest.mark.parametrize(("slope", "gain", "ends"), [(0.11, 0.009, False), (0.09, 0.011, False), (0.09, 0.009, True)])
-def test_one_of_the_two_alone_does_not_end_it(slope, gain, ends):
+def test_one_tolerance_alone_does_not_stop_it(slope, gain, ends):
     asked = []
 
     def objective(_):
@@ -92,7 +92,7 @@ def test_one_of_the_two_alone_does_not_end_it(slope, gain, ends):
     assert len(places) == (2 if ends else 501)
 
 
-def test_a_variable_that_is_held_does_not_keep_it_from_ending():
+def test_a_fixed_variable_does_not_prevent_convergence():
     _, _, ended = ascend(lambda _: (0.0, np.array([0.0, 7.0])), np.zeros(2), FAR, np.array([True, False]))
     assert ended
 
@@ -113,7 +113,7 @@ def test_where_the_value_does_not_exist_the_step_is_halved():
     assert not ended
 
 
-def test_progress_is_told_every_value():
+def test_progress_is_called_with_every_value():
     told = []
     _, values, _ = ascend(bowl, np.zeros(2), FAR, BOTH, told.append)
     assert told == values[1:].tolist()
@@ -125,7 +125,7 @@ def evidence():
     return evidence_of(make.drawn(scene, Reward((-32.0, -2.0, -4.0, 3.0)), 60, seed=6))
 
 
-def test_a_fit_by_adam_goes_the_way_of_the_plain_loop_and_ends_at_newtons_maximum(evidence):
+def test_a_fit_by_adam_follows_the_plain_loop_and_ends_at_newtons_maximum(evidence):
     start = Reward.named({})
     scale = np.array([10.0, 1.0, 1.0, 1.0])
 
@@ -160,14 +160,14 @@ def test_adam_begins_at_the_given_start_alone_and_leaves_fixed_parameters(eviden
     )
 
 
-def test_where_nothing_may_move_it_has_arrived(evidence):
+def test_it_converges_at_once_if_all_variables_are_fixed(evidence):
     start = Reward.named({})
     found = fit(evidence, start, 0.0, method=Method.ADAM, fixed=("c0", "a_g", "a_p", "sigma_p"))
     assert found.reward == start
     assert found.status is Status.CONVERGED
 
 
-def test_a_variable_pushed_against_its_bound_does_not_keep_it_from_ending():
+def test_a_variable_on_its_bound_does_not_prevent_convergence():
     places, _, ended = ascend(bowl, np.zeros(2), (np.array([-9.0, -7.5]), np.array([9.0, 0.0])), BOTH)
     assert places[-1] == pytest.approx([3.0, -7.5], abs=0.1)
     assert ended

@@ -33,14 +33,14 @@ def evidence():
         ),
     ],
 )
-def test_questions_that_exclude_each_other_are_refused_before_anything_is_read(questions, changes, message):
+def test_analyses_that_exclude_each_other_are_refused_before_reading(questions, changes, message):
     arguments = {"steps": Steps.ALL, "prior": False, "l2": PAPER_L2}
     Questions(correct_bias=True).check_arguments(**arguments)
     with pytest.raises(ArgumentError, match=message):
         questions.check_arguments(**arguments | changes)
 
 
-def test_questions_that_the_data_cannot_answer_are_refused_before_the_fit(evidence):
+def test_analyses_that_the_data_do_not_allow_are_refused_before_the_fit(evidence):
     Questions(bootstrap=2, profiles=("c0",), cross_validate=True).check(evidence, TRUTH)
     with pytest.raises(RewardError, match="expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'"):
         Questions(profiles=("c1",)).check(evidence, TRUTH)
@@ -50,7 +50,7 @@ def test_questions_that_the_data_cannot_answer_are_refused_before_the_fit(eviden
             questions.check(alone, TRUTH)
 
 
-def test_a_question_without_an_answer_leaves_the_fit_and_the_other_answers(evidence, monkeypatch):
+def test_a_failed_analysis_keeps_the_fit_and_the_other_analyses(evidence, monkeypatch):
     def no_answer(*_args, **_options):
         raise RewardError("a better fit was found")
 

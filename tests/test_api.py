@@ -198,7 +198,7 @@ class TestFrames:
         with pytest.raises(navirl.NavirlError, match="expected one of 'groups', 'demonstrations', 'pairs', 'ranks'"):
             found.to_frame("rank")
 
-    def test_without_pandas_the_error_says_how_to_get_it(self, monkeypatch):
+    def test_without_pandas_the_error_gives_the_install_command(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "pandas", None)
         with pytest.raises(navirl.NavirlError, match="pip install pandas"):
             frame_of([])
@@ -277,18 +277,18 @@ class TestErrors:
             (lambda _d, r: navirl.plot.profile(r, "c0"), r"profile likelihood \(sigma_p\), found 'c0'"),
         ],
     )
-    def test_expected_errors_are_one_kind_and_name_the_argument(self, demos, reward, call, message):
+    def test_expected_errors_are_one_type_and_name_the_argument(self, demos, reward, call, message):
         with pytest.raises(navirl.NavirlError, match=message):
             call(demos, reward)
 
-    def test_what_is_lost_is_warned_of_at_the_line_of_the_call(self, tmp_path):
+    def test_lost_data_gives_a_warning_at_the_line_of_the_call(self, tmp_path):
         (tmp_path / "broken.mcap").write_bytes(b"no log at all")
         with pytest.warns(navirl.NavirlWarning, match=r"broken\.mcap") as caught:
             found = navirl.extract(LOGS[0], tmp_path / "broken.mcap")
         assert caught[0].filename == __file__
         assert len(found.lost) == 1
 
-    def test_a_fit_that_did_not_converge_is_warned_of(self, demos):
+    def test_a_fit_that_did_not_converge_gives_a_warning(self, demos):
         with pytest.warns(navirl.NavirlWarning, match="fit: ") as caught:
             found = navirl.fit([one for one in demos if one.id == "p01/7"], l2=0.0)
         assert found.status.value in str(caught[0].message)

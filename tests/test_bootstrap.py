@@ -53,7 +53,7 @@ def counts(monkeypatch):
     return seen
 
 
-def test_all_demonstrations_of_a_participant_come_together(twelve, found, counts):
+def test_all_demonstrations_of_a_participant_are_drawn_together(twelve, found, counts):
     drawn = bootstrap(twelve, found, 12, 5, executor=Here())
     assert len(counts) == len(drawn.theta) == 12
     names = np.array(twelve.participants)
@@ -65,7 +65,7 @@ def test_all_demonstrations_of_a_participant_come_together(twelve, found, counts
     assert max(count.max() for count in counts) >= 3
 
 
-def test_a_replicate_is_the_fit_of_those_who_were_drawn(twelve, found, counts):
+def test_a_replicate_is_the_fit_to_the_drawn_participants(twelve, found, counts):
     drawn = bootstrap(twelve, found, 3, 5, executor=Here())
     for theta, count in zip(drawn.theta, counts, strict=True):
         again = fit(twelve.repeated(count), START, 0.0)
@@ -155,7 +155,7 @@ def test_one_participant_cannot_be_drawn_from():
         bootstrap(evidence, fit(evidence, START), 5, 0)
 
 
-def test_a_participant_none_of_whose_steps_is_left_is_not_drawn(twelve):
+def test_a_participant_without_selected_steps_is_not_drawn(twelve):
     masks = [np.zeros(0, bool)] * twelve.count
     for part in twelve.scenes:
         for owner in np.unique(part.owner).tolist():
@@ -165,7 +165,7 @@ def test_a_participant_none_of_whose_steps_is_left_is_not_drawn(twelve):
         bootstrap(alone, fit(alone, START), 8, 0, executor=Here())
 
 
-def test_draws_that_do_not_tell_a_parameter_say_nothing_of_it():
+def test_draws_that_do_not_identify_a_parameter_are_left_out_of_its_errors():
     # One of three participants meets somebody.
     alone = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4])
     met = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])

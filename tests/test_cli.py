@@ -128,7 +128,7 @@ def test_extract_json_has_numbers(navirl, tmp_path):
         ({}, ("-o", "no/demos.json"), "no/demos.json: expected an existing folder, found none at no; create it"),
     ],
 )
-def test_extract_says_in_one_line_what_is_wrong(navirl, tmp_path, changes, options, message):
+def test_errors_of_extract_are_one_line(navirl, tmp_path, changes, options, message):
     result = navirl("extract", log_with(tmp_path, **changes), "-o", "demos.json", *options, code=1)
     assert message in result.stderr
     assert result.stderr.startswith("navirl: ")
@@ -146,7 +146,7 @@ def test_extract_says_in_one_line_what_is_wrong(navirl, tmp_path, changes, optio
         (b"hello", "MCAP"),
     ],
 )
-def test_other_formats_are_named_with_the_way_out(navirl, tmp_path, content, message):
+def test_other_formats_are_named_with_a_remedy(navirl, tmp_path, content, message):
     path = tmp_path / "log.bag"
     path.write_bytes(content)
     stderr = navirl("extract", path, "-o", "demos.json", code=1).stderr
@@ -179,7 +179,7 @@ def test_a_cut_log_gives_what_is_left_with_exit_code_3(navirl, tmp_path):
     assert "cut.mcap" in result.stderr
 
 
-def test_a_skipped_trial_is_told_with_exit_code_3(navirl, tmp_path):
+def test_a_skipped_trial_is_reported_with_exit_code_3(navirl, tmp_path):
     log = log_with(tmp_path, goals=((1.5, 4.0, 0.0), (13.0, 0.0, 0.0)))
     result = navirl("extract", log, "-o", "demos.json", code=3)
     assert "run.mcap: trial 2: the robot gets no farther than 0.00 m: an empty trial" in result.stderr
@@ -257,7 +257,7 @@ def test_fit_starts_from_parameters_and_from_an_earlier_reward(navirl, work):
         assert new["value"] == pytest.approx(old["value"], rel=1e-3)
 
 
-def test_fit_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
+def test_errors_of_fit_are_one_line(navirl, work, tmp_path):
     demos = work / "demos.json"
     for words, message in (
         (("--condition", "joystick", "--cycle", "2"), "--condition and --cycle: expected one of 'autonomous, "),
@@ -289,7 +289,7 @@ def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
     assert [d["id"] for d in document["demonstrations"]] == [f"p01/{n}" for n in range(1, 8)]
 
 
-def test_evaluate_knows_one_seed_from_another(navirl, work):
+def test_evaluate_depends_on_the_seed(navirl, work):
     words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "5", "--format", "csv")
     assert navirl(*words).stdout == navirl(*words, "--seed", "0").stdout
     assert navirl(*words).stdout != navirl(*words, "--seed", "1").stdout
@@ -301,7 +301,7 @@ def test_evaluate_without_a_reward_measures_no_learnt_paths(navirl, work):
     assert {group["path_type"] for group in document["groups"]} == {"driven", "driven, on grid", "nominal", "avoidance"}
 
 
-def test_plot_says_in_one_line_what_is_wrong(navirl, work, tmp_path):
+def test_errors_of_plot_are_one_line(navirl, work, tmp_path):
     demos, reward = work / "demos.json", ("--reward", work / "reward.json")
     for words, message in (
         (("policy", demos, *reward, "-o", "a.png", "--trial", "p9/9"), "--trial: expected one of 'p01/1', "),
@@ -325,7 +325,7 @@ def test_simulate_writes_logs_that_extract_reads(navirl):
 
 
 @pytest.mark.parametrize(("given", "expected"), [(None, "1"), ("3", "3")])
-def test_one_thread_of_blas_unless_the_user_says_otherwise(given, expected):
+def test_one_thread_of_blas_unless_the_user_sets_more(given, expected):
     code = (
         "import os, sys\nfrom navirl_cli.cli import main\nsys.argv[1:] = ['--version']\n"
         "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"

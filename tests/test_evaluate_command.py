@@ -150,7 +150,7 @@ def test_groups_by_participant(navirl, work):
     assert {one["count"] for one in document["groups"]} == {7}
 
 
-def test_ranks_are_told_with_their_test(navirl, work):
+def test_ranks_are_printed_with_their_test(navirl, work):
     words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--ranks", "--samples", "200")
     document = json.loads(navirl(*words, "-o", "m.json", "--json").stdout)
     ranks = document["ranks"]

@@ -49,7 +49,7 @@ def test_every_step_of_every_path_is_there_once(four):
     assert (four.count, four.owners.tolist(), four.steps) == (4, [0, 1, 2, 3], 16)
 
 
-def test_equal_scenes_are_one_wherever_they_stand_and_others_are_not(four):
+def test_equal_scenes_are_one_object_and_others_are_not(four):
     assert [sorted(set(part.owner.tolist())) for part in four.scenes] == [[0, 2], [1, 3]]
     with_person = evidence_of(
         [path(EAST, 1), path(EAST, 2, people=[[0.3, 0.3]]), path(BENT, 3), path(BENT, 4, people=[[0.3, 0.3]])]
@@ -67,7 +67,7 @@ def test_only_some_steps_are_taken(four):
     assert some.uniform_log_likelihood() == pytest.approx(-np.log(3 * 5 * 8 * 8))
 
 
-def test_a_scene_without_a_step_left_is_left_out(four):
+def test_a_scene_without_selected_steps_is_left_out(four):
     east = four.only([np.ones(5, bool), np.zeros(3, bool), np.ones(5, bool), np.zeros(3, bool)])
     assert len(east.scenes) == 1
     assert log_likelihood(east, TRUTH) == pytest.approx(
@@ -90,7 +90,7 @@ def test_some_steps_repeated(four):
     assert steps_of(some.repeated(np.array([3, 1, 0, 1]))) == [(0, 2, 2, 1, 3, 1)] * 3
 
 
-def test_where_no_step_is_left_there_is_nothing_to_learn(four):
+def test_no_selected_step_is_an_error(four):
     for empty in (
         lambda: four.only([np.zeros(n, bool) for n in (5, 3, 5, 3)]),
         lambda: four.repeated(np.zeros(4, int)),
@@ -105,7 +105,7 @@ def test_steps_that_a_path_takes_twice_are_two():
     assert [step[2:] for step in steps_of(back_and_forth)] == [(0, 1, 1, 1), (1, 1, 0, 1), (0, 1, 1, 1), (1, 1, 2, 1)]
 
 
-def test_a_path_that_ends_where_it_began_is_refused_by_name():
+def test_a_path_that_ends_at_its_start_is_refused_by_name():
     with pytest.raises(
         SceneError, match=r"^demonstration p9/5: start and goal lie in the same cell at x 0\.05 m, y 0\.15"
     ):

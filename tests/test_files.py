@@ -10,7 +10,7 @@ from navirl_cli.irl.series import InfinitePartitionError, ValueStatus
 from navirl_cli.parallel import map_in_order
 
 
-def test_what_a_link_names_is_replaced_not_the_link(tmp_path):
+def test_the_target_of_a_link_is_replaced_not_the_link(tmp_path):
     target, link = tmp_path / "target", tmp_path / "link"
     target.write_text("old")
     link.symlink_to(target)
@@ -20,7 +20,7 @@ def test_what_a_link_names_is_replaced_not_the_link(tmp_path):
     assert target.read_text() == "new"
 
 
-def test_an_exception_leaves_nothing(tmp_path):
+def test_an_exception_leaves_no_file(tmp_path):
     def interrupted():
         with replacing(tmp_path / "x", force=False) as temporary:
             temporary.write_text("half")
@@ -70,7 +70,7 @@ def test_a_file_is_no_folder(tmp_path):
             pass
 
 
-def test_errors_and_results_cross_process_borders():
+def test_errors_and_results_are_passed_between_processes():
     error = pickle.loads(pickle.dumps(InfinitePartitionError(ValueStatus.INFINITE)))
     assert error.status is ValueStatus.INFINITE
     assert str(error) == str(InfinitePartitionError(ValueStatus.INFINITE))

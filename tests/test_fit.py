@@ -59,7 +59,7 @@ def test_from_an_indifferent_start_the_personal_space_is_learnt(many):
     assert found.reward.theta == pytest.approx(fit(many, START, l2=0.0).reward.theta, rel=1e-3)
 
 
-def test_the_way_up_is_recorded(many):
+def test_the_accepted_steps_are_recorded(many):
     told = []
     found = fit(many, START, l2=0.01, progress=lambda step, value: told.append((step, value)))
     assert [step for step, _ in told] == list(range(1, len(told) + 1))
@@ -81,7 +81,7 @@ def test_the_regulariser_pulls_toward_zero_in_its_scales(many):
 
 @pytest.mark.parametrize("l2", [0.0, 1e-3, 1.0])
 @pytest.mark.parametrize("person", [make.NOBODY, [[60.0, 60.0]]], ids=["nobody", "far away"])
-def test_without_a_person_near_the_personal_space_stays_where_it_was(l2, person):
+def test_without_a_person_nearby_the_personal_space_keeps_its_initial_values(l2, person):
     scene = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4], person)
     evidence = evidence_of(make.drawn(scene, Reward((-35.0, -0.6, 0.0, 1.0)), 30, seed=3))
     found = fit(evidence, START, l2=l2)
@@ -93,7 +93,7 @@ def test_without_a_person_near_the_personal_space_stays_where_it_was(l2, person)
     assert np.isnan(found.standard_errors[2:]).all()
 
 
-def test_a_parameter_on_its_bound_is_said_and_has_no_standard_error():
+def test_a_parameter_on_its_bound_is_reported_and_has_no_standard_error():
     # Paths along both borders of a field: leaving the nominal path pays, but a_g cannot be positive.
     grid = make.open_grid(16, 9)
     rim = [[0, 4], [1, 5], [2, 6], [3, 7], *[[c, 8] for c in range(4, 12)], [12, 7], [13, 6], [14, 5], [15, 4]]
@@ -112,7 +112,7 @@ def test_a_parameter_on_its_bound_is_said_and_has_no_standard_error():
     assert alone.reward.theta == pytest.approx(found.reward.theta[:2], rel=1e-6)
 
 
-def test_a_path_that_is_always_shortest_has_no_best_cost_of_way():
+def test_a_path_that_is_always_shortest_has_no_best_cost_of_path_length():
     # On a corridor of one cell the straight way is the likelier the more way costs, without end, and nothing lies
     # beside the nominal path.
     grid = make.open_grid(12, 1)
@@ -139,7 +139,7 @@ def test_a_start_without_a_partition_function_is_refused(many):
         fit(many, Reward((-10.0, 0.0, 0.0, 1.0)))
 
 
-def test_every_status_says_what_to_do():
+def test_every_status_gives_advice():
     assert [status.value for status in Status] == [
         "converged",
         "stopped early",
@@ -157,7 +157,7 @@ def test_the_same_evidence_gives_the_same_fit(many):
 
 
 @pytest.mark.parametrize("fixed", [("sigma_p",), ("c0", "a_g"), ("c0", "a_g", "a_p", "sigma_p")])
-def test_fixed_parameters_stay_and_the_others_make_the_best_of_it(many, fixed):
+def test_fixed_parameters_are_constant_and_the_others_are_optimal(many, fixed):
     start = Reward((-34.0, -0.4, -3.0, 3.5))
     found = fit(many, start, l2=0.0, fixed=fixed)
     held = np.array([parameter.name in fixed for parameter in start.parameters])
@@ -176,7 +176,7 @@ def test_fixed_parameters_stay_and_the_others_make_the_best_of_it(many, fixed):
         assert found.iterations == 0
 
 
-def test_a_parameter_held_on_its_bound_is_not_said_to_have_ended_there(many):
+def test_a_parameter_fixed_on_its_bound_is_not_reported_as_on_bound(many):
     found = fit(many, Reward((-40.0, 0.0, -2.0, 1.0)), l2=0.0, fixed=("a_g",))
     assert found.reward.theta[1] == 0.0
     assert not found.on_bound.any()
@@ -193,7 +193,7 @@ def test_without_restarts_one_search_is_made_and_adam_makes_one_only(many):
     assert adam.method is Method.ADAM
 
 
-def test_where_the_way_up_leads_out_of_the_finite_it_is_said(monkeypatch):
+def test_an_ascent_to_an_infinite_partition_function_is_reported(monkeypatch):
     # The partition function never ends abruptly; here it is made to.
     real = objective_module.likelihood
 
@@ -210,7 +210,7 @@ def test_where_the_way_up_leads_out_of_the_finite_it_is_said(monkeypatch):
     assert "endless detours outweigh the direct path" in found.status.advice
 
 
-def test_wandering_demonstrations_are_learnt_close_to_the_edge_of_the_finite():
+def test_wandering_demonstrations_are_learnt_close_to_an_infinite_partition_function():
     # To and fro, again and again: the policy that drives as far on average is close to none at all.
     grid = make.open_grid(12, 7)
     there = [[c, 3] for c in range(10)]
@@ -226,14 +226,14 @@ def test_wandering_demonstrations_are_learnt_close_to_the_edge_of_the_finite():
         policy_of(Reward((found.reward.theta[0] + 0.5,), START.terms[:1]), scene)
 
 
-def test_a_search_that_is_cut_short_says_so(many, monkeypatch):
+def test_a_search_that_is_cut_short_is_reported(many, monkeypatch):
     from navirl_cli.irl import newton
 
     monkeypatch.setattr(newton, "MAX_ITERATIONS", 2)
     assert fit(many, START, l2=0.0, restarts=False).status is Status.STOPPED_EARLY
 
 
-def test_the_worst_ending_is_the_one_that_is_told():
+def test_the_worst_status_is_reported():
     best = fit_module.Maximum(None, True, False, None, None)
     yes, no = np.array([True, True]), np.array([True, False])
     for maximum, identified, on_bound, status in (

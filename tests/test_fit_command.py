@@ -65,7 +65,7 @@ def full(files):
     return read_json(files / "full.json", "reward")
 
 
-def test_what_was_not_asked_for_is_not_there(files, full):
+def test_analyses_that_were_not_requested_are_absent(files, full):
     document = read_json(files / "reward.json", "reward")
     assert (document["bootstrap"], document["profiles"], document["cross_validation"]) == (None, [], None)
     assert (document["method"], document["prior"], document["l2"]) == ("newton", False, 1e-3)
@@ -209,7 +209,7 @@ def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
         (("--prior", "{}/demos.json"), 1, "expected navirl reward (format 'navirl/reward')"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_asked_for_is_refused_and_nothing_is_written(navirl, files, tmp_path, words, code, message):
+def test_invalid_requests_are_refused_and_no_file_is_written(navirl, files, tmp_path, words, code, message):
     words = [word.format(files) for word in words]
     result = navirl("fit", files / "demos.json", "-o", "r.json", *words, code=code)
     assert message in result.stderr
@@ -232,13 +232,13 @@ def test_a_prior_on_other_cells_is_refused(navirl, files):
         (("--cross-validate", "participant"), "navirl: --cross-validate: expected several participants, found"),
     ],
 )  # fmt: skip
-def test_what_one_participant_cannot_say_is_refused(navirl, files, words, message):
+def test_analyses_of_several_participants_are_refused_for_one(navirl, files, words, message):
     stderr = navirl("fit", files / "one.json", "-o", "r.json", *words, code=1).stderr
     assert stderr.startswith(message)
     assert stderr.count("\n") == 1
 
 
-def test_a_prior_that_is_no_covariance_is_refused(navirl, files):
+def test_a_prior_with_an_invalid_covariance_is_refused(navirl, files):
     document = json.loads((files / "reward.json").read_text())
     document["covariance"][0][0] = -1.0
     Path("broken.json").write_text(json.dumps(document))
@@ -289,7 +289,7 @@ def test_few_participants_are_too_few_for_errors_by_participant(evidence):
     assert warnings({**content, "participants": ["p01"]}) == []
 
 
-def test_demonstrations_of_the_robot_alone_are_told(navirl, files):
+def test_demonstrations_without_intervention_are_reported(navirl, files):
     demonstrations = read_demonstrations(files / "one.json")
     some = [replace(one, corrected=number > 1) for number, one in enumerate(demonstrations)]
     write_json(Path("some.json"), "demonstrations", demonstrations_document(some, [], {}), force=False)
@@ -299,7 +299,7 @@ def test_demonstrations_of_the_robot_alone_are_told(navirl, files):
         assert "no intervention" not in navirl("fit", "some.json", "-o", "b.json", "--force", *options).stderr
 
 
-def test_what_is_read_is_not_replaced(navirl, files):
+def test_input_files_are_not_replaced(navirl, files):
     before = (files / "one.json").read_bytes()
     told = navirl("fit", files / "one.json", "-o", files / "one.json", "--force", code=2).stderr
     assert "expected another file than the input" in told
@@ -307,7 +307,7 @@ def test_what_is_read_is_not_replaced(navirl, files):
     assert (files / "one.json").read_bytes() == before
 
 
-def test_a_question_without_an_answer_does_not_cost_the_fit(navirl, files, monkeypatch):
+def test_a_failed_analysis_keeps_the_fit(navirl, files, monkeypatch):
     def nothing(*_args, **_options):
         raise RewardError("`profile` a_p: the profile found a better fit")
 
@@ -327,7 +327,7 @@ def test_a_prior_must_be_a_maximum_and_should_be_of_others(navirl, files):
     assert "navirl: --prior: expected a fit at its maximum, found one that ended with stopped early" in told
 
 
-def test_the_bias_is_taken_off_and_told(navirl, files):
+def test_the_bias_is_subtracted_and_reported(navirl, files):
     plain = read_json(files / "reward.json", "reward")
     text = navirl("fit", files / "demos.json", "-o", "r.json", "--correct-bias").stdout
     found = read_json(Path("r.json"), "reward")
@@ -342,7 +342,7 @@ def test_the_bias_is_taken_off_and_told(navirl, files):
         assert "--correct-bias needs all steps and no prior" in told
 
 
-def test_a_bias_too_large_to_be_taken_off_leaves_the_fit_as_it_is(navirl, files):
+def test_a_bias_too_large_for_correction_leaves_the_fit_unchanged(navirl, files):
     one = read_demonstrations(files / "demos.json")[:1]
     write_json(Path("single.json"), "demonstrations", demonstrations_document(one, [], {}), force=False)
     told = navirl("fit", "single.json", "-o", "r.json", "--correct-bias", code=3).stderr

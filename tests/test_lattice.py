@@ -24,7 +24,7 @@ ROOM = make.grid_of(
 )
 
 
-def test_a_lattice_holds_what_can_be_reached_and_no_more():
+def test_a_lattice_holds_exactly_the_reachable_cells():
     lattice = Lattice.around(ROOM, np.array([0, 0]))
     cells = {tuple(cell) for cell in lattice.cells.tolist()}
     free = ~ROOM.occupied
@@ -59,7 +59,7 @@ def test_a_step_is_a_cell_long_or_a_diagonal():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_costs_of_way_against_plain_dijkstra(seed):
+def test_costs_of_paths_against_plain_dijkstra(seed):
     scene = make.random_scene(np.random.default_rng(seed), 14, 11, density=0.3)
     lattice, goal = scene.lattice, tuple(scene.lattice.cells[scene.goal].tolist())
     steps = oracles.steps_from(~lattice.grid.occupied, goal)
@@ -82,7 +82,7 @@ def test_costs_belong_to_the_cell_that_is_left():
 
 
 @pytest.mark.parametrize("cell", [[1, 1], [8, 0], [0, -1]])
-def test_an_occupied_cell_is_no_place_to_start(cell):
+def test_an_occupied_cell_is_refused_as_start(cell):
     x, y = ROOM.centres_of(cell)
     with pytest.raises(SceneError, match=rf"the cell at x {x:.2f} m, y {y:.2f} m is not free on the map"):
         Lattice.around(ROOM, np.array(cell))

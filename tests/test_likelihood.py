@@ -97,7 +97,7 @@ def test_scores_sum_to_the_gradient_and_each_is_that_of_its_demonstration():
         assert found.scores[number] == pytest.approx(alone, rel=1e-9, abs=1e-10)
 
 
-def test_equal_scenes_are_solved_once_wherever_they_stand():
+def test_equal_scenes_are_solved_once():
     demonstrations = crowd(1)
     shuffled = [demonstrations[i] for i in (3, 0, 4, 1, 2)]
     evidence = evidence_of(shuffled)
@@ -169,7 +169,7 @@ def turned(one):
 
 
 @pytest.mark.parametrize("change", [shifted, mirrored, turned], ids=lambda change: change.__name__)
-def test_where_and_how_the_world_lies_changes_nothing(change):
+def test_translation_and_rotation_of_the_world_change_nothing(change):
     demonstrations = crowd(2)
     close(
         likelihood(evidence_of([change(d) for d in demonstrations]), TRUTH),
@@ -199,7 +199,7 @@ def test_the_expected_gradient_is_zero_at_the_truth():
     )
 
 
-def test_no_demonstration_is_nothing_to_learn_from():
+def test_no_demonstrations_are_an_error():
     with pytest.raises(DemonstrationError, match="no demonstration to learn from"):
         evidence_of([])
 
@@ -348,7 +348,7 @@ def test_feature_sums_are_sums_over_the_steps_that_count():
 
 
 @pytest.mark.parametrize("change", [shifted, mirrored, turned], ids=lambda change: change.__name__)
-def test_where_and_how_the_world_lies_does_not_change_the_fit(change):
+def test_translation_and_rotation_of_the_world_do_not_change_the_fit(change):
     scene = make.scene_on(make.open_grid(16, 9, (-0.35, 0.8)), [0, 4], [15, 4], [[0.45, 1.2]])
     demonstrations = make.drawn(scene, TRUTH, 30, seed=5)
     one, other = (fit(evidence_of(some), Reward.named({})) for some in (demonstrations, [*map(change, demonstrations)]))

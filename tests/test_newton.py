@@ -39,7 +39,7 @@ def test_a_quadratic_is_climbed_to_its_top_and_every_accepted_point_is_reported(
     assert found.path[-1].tolist() == found.best.x.tolist()
 
 
-def test_a_bound_is_met_and_the_others_make_the_best_of_it():
+def test_a_bound_is_met_and_the_others_are_optimal():
     # Top at (2, 2); x is held at 1, where d/dy (-y^2 + y x + ...) = 0: H = [[-2, 1], [1, -2]], g = (2, 2).
     objective = quadratic(np.array([2.0, 2.0]), np.array([[-2.0, 1.0], [1.0, -2.0]]))
     found = climb(objective, [0.0, 0.0], upper=[1.0, 10.0])
@@ -48,14 +48,14 @@ def test_a_bound_is_met_and_the_others_make_the_best_of_it():
     assert found.best.x[1] == pytest.approx(1.5, abs=1e-9)
 
 
-def test_a_bound_is_let_go_when_the_objective_gains_by_it():
+def test_a_bound_is_left_when_that_raises_the_objective():
     objective = quadratic(np.array([-2.0, -2.0]), np.array([[-2.0, 0.0], [0.0, -2.0]]))
     found = climb(objective, [0.0, 5.0], upper=[0.0, 10.0])
     assert found.converged
     assert found.best.x == pytest.approx([-1.0, -1.0], abs=1e-9)
 
 
-def test_what_is_not_free_does_not_move():
+def test_fixed_variables_do_not_move():
     objective = quadratic(np.array([2.0, 2.0]), np.array([[-2.0, 1.0], [1.0, -2.0]]))
     found = climb(objective, [0.25, 0.0], free=[False, True])
     assert found.converged
@@ -151,7 +151,7 @@ def test_where_the_objective_does_not_exist_the_step_is_shortened():
     assert not found.blocked
 
 
-def test_in_front_of_a_cliff_it_does_not_claim_to_have_arrived():
+def test_it_does_not_report_convergence_at_a_jump_of_the_objective():
     def objective(x):
         value = float(x[0]) if x[0] < 1 else -np.inf
         return Point(x, value, np.ones(1), np.zeros((1, 1)))
@@ -170,7 +170,7 @@ def test_a_climb_without_end_is_not_converged():
 
 
 @pytest.mark.parametrize("beyond", [-np.inf, 1e9 - 1.0])
-def test_a_step_that_promises_less_than_rounding_is_not_taken_downhill(beyond):
+def test_a_step_with_a_predicted_gain_below_rounding_is_not_taken_downhill(beyond):
     # A value of 1e9 is known to 1e-7: promises below are not told from noise, but a loss of 1 is no noise.
     def objective(x):
         if x[0] > 0:
@@ -231,7 +231,7 @@ def waves(x):
 
 
 @pytest.mark.parametrize(("start", "same"), [(0.9, True), (-0.5, True), (5.5, False), (1.6, True), (4.6, False)])
-def test_a_climb_that_is_bound_for_a_known_top_ends_there_and_no_other(start, same):
+def test_a_search_that_converges_to_a_known_maximum_ends_early(start, same):
     top = climb(waves, [0.3]).best
     begin = waves(np.array([start]))
     again = maximise(waves, begin, (np.array([-20.0]), np.array([20.0])), np.array([True]), known=[top])

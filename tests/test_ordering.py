@@ -35,7 +35,7 @@ def test_climbs_against_a_walk_from_every_state(seed):
     assert scene.ordering.climbs(parent) == slow
 
 
-def test_ways_that_only_descend_do_not_climb():
+def test_paths_that_only_descend_have_no_climbs():
     scene = make.random_scene(np.random.default_rng(3), 14, 11, density=0.2)
     _, parent = scene.lattice.cheapest_tree(scene.goal, scene.lattice.step_m)
     assert scene.ordering.climbs(parent) == 0
@@ -88,7 +88,7 @@ def two_gates():
 
 @pytest.mark.parametrize("banded", [False, True], ids=["plain", "banded"])
 @pytest.mark.parametrize("world", [behind_a_row_of_people, two_gates])
-def test_where_the_best_way_leads_off_first_another_order_is_made_and_values_are_right(world, banded, monkeypatch):
+def test_a_new_order_is_made_for_best_paths_that_first_lead_away_and_values_are_right(world, banded, monkeypatch):
     made = []
     real = values.Ordering
     monkeypatch.setattr(values, "Ordering", lambda *args: made.append(real(*args)) or made[-1])

@@ -18,7 +18,7 @@ def draw(count, seed):
     return sample_paths(POLICY, SCENE.start, count, np.random.default_rng(seed))
 
 
-def test_visits_are_as_often_as_the_policy_says():
+def test_visit_frequencies_are_those_of_the_policy():
     count = 20_000
     drawn = draw(count, 0)
     on_the_way = np.arange(drawn.states.shape[1]) < drawn.lengths[:, None]
@@ -34,7 +34,7 @@ def test_visits_are_as_often_as_the_policy_says():
     assert drawn.lengths.mean() == pytest.approx(expected.sum(), rel=0.01)
 
 
-def test_moves_are_as_often_as_the_policy_says():
+def test_move_frequencies_are_those_of_the_policy():
     # At the start of every path the choice is a plain draw of one of eight.
     count = 20_000
     second = draw(count, 1).states[:, 1]
@@ -77,7 +77,7 @@ def test_a_hard_policy_drives_the_only_shortest_path():
     assert (scene.lattice.cells[drawn.states][:, :, 1] == 2).all()
 
 
-def test_a_path_that_wanders_on_and_on_is_given_up(monkeypatch):
+def test_a_path_that_does_not_reach_the_goal_is_an_error(monkeypatch):
     monkeypatch.setattr(paths, "PATIENCE", 0)
     corridor = make.scene_on(make.open_grid(150, 1), [0, 0], [149, 0])
     with pytest.raises(RewardError, match="a sampled path did not reach the goal within 100 steps"):

@@ -53,7 +53,7 @@ def test_a_gaussian_against_scipy():
     assert prior.gradient(MEAN) == pytest.approx(np.zeros(4), abs=1e-10)
 
 
-def test_what_has_no_covariance_is_not_known():
+def test_parameters_without_covariance_have_no_prior():
     holes = COVARIANCE.copy()
     holes[1] = holes[:, 1] = np.nan
     prior = Prior.gaussian(MEAN, holes)
@@ -85,7 +85,7 @@ def test_two_priors_add_up():
     ],
     ids=["negative", "singular", "lopsided", "holes", "correlation above one"],
 )
-def test_what_is_no_covariance_is_refused(change):
+def test_an_invalid_covariance_is_refused(change):
     broken = COVARIANCE.copy()
     change(broken)
     with pytest.raises(RewardError, match="the covariance of the prior is not positive definite"):
@@ -123,7 +123,7 @@ def test_the_same_data_twice_halve_the_covariance(halves):
     assert twice.covariance == pytest.approx(once.covariance / 2, rel=1e-3)
 
 
-def test_a_prior_pulls_the_more_the_surer_it_is(halves):
+def test_a_more_certain_prior_pulls_more(halves):
     second = halves[1]
     alone = np.array(fit(second, START, 0.0).reward.theta)
     aim = alone + np.array([4.0, -0.3, 1.0, 1.0])
@@ -140,7 +140,7 @@ def test_a_prior_pulls_the_more_the_surer_it_is(halves):
     assert distances[-1] < 1e-2
 
 
-def test_what_only_the_prior_tells_is_told():
+def test_parameters_identified_by_the_prior_alone_are_identified():
     nobody = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4])
     evidence = evidence_of(make.drawn(nobody, Reward((-35.0, -0.6, 0.0, 1.0)), 30, seed=3))
     prior = Prior.gaussian(np.array([0.0, 0.0, -3.0, 2.5]), np.diag([np.nan, np.nan, 0.25, 0.04]))

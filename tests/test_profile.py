@@ -140,7 +140,7 @@ def test_a_parameter_on_its_bound_is_profiled_to_one_side():
     assert brute(evidence, "a_g", followed.lower) - found.objective == pytest.approx(-fall_at(0.95), abs=5e-3)
 
 
-def test_progress_is_told_the_parameter_and_its_value(evidence, found):
+def test_progress_gets_the_parameter_and_its_value(evidence, found):
     told = []
     followed = profile(evidence, found, "a_p", progress=lambda done, text: told.append((done, text)))
     assert [done for done, _ in told] == list(range(2, len(followed.values) + 1))
@@ -152,7 +152,7 @@ def test_an_unknown_parameter_is_refused(evidence, found):
         profile(evidence, found, "c9")
 
 
-def test_what_the_data_do_not_tell_is_not_profiled():
+def test_a_parameter_that_is_not_identified_is_not_profiled():
     nobody = make.scene_on(make.open_grid(12, 7), [0, 3], [11, 3])
     evidence = evidence_of(make.drawn(nobody, TRUTH, 20, seed=3))
     found = fit(evidence, START, 0.0)
@@ -161,7 +161,7 @@ def test_what_the_data_do_not_tell_is_not_profiled():
         profile(evidence, found, "sigma_p")
 
 
-def test_a_better_fit_on_the_way_is_said_with_the_way_there(evidence, found):
+def test_a_better_fit_is_reported_with_its_parameters(evidence, found):
     # A fit that is none: its objective is lower than what the others reach without it.
     theta = (found.reward.theta[0] - 8.0, *found.reward.theta[1:])
     fake = replace(found, reward=Reward(theta), objective=log_likelihood(evidence, Reward(theta)))

@@ -49,7 +49,7 @@ def test_reported_standard_errors_are_those_of_the_expected_information(fits, mo
     assert reported == pytest.approx(moments.standard_errors(recovery.DEMONSTRATIONS), rel=0.3)
 
 
-def test_the_default_regulariser_moves_nothing_that_matters(fits, moments):
+def test_the_default_regulariser_has_no_relevant_effect(fits, moments):
     errors = moments.standard_errors(recovery.DEMONSTRATIONS)
     assert max(np.abs((one.regularised - one.theta) / errors).max() for one in fits) < 0.05
 

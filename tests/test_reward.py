@@ -40,7 +40,7 @@ def test_the_absorbing_goal_has_no_reward(scene):
         assert len(array) == 1 or (array[scene.goal] == 0).all()
 
 
-def test_reward_by_cell_leaves_out_what_belongs_to_the_move(scene):
+def test_reward_by_cell_leaves_out_the_part_of_the_move(scene):
     people = scene.people_m
     expected = [
         -0.5 * scene.deviation_m[state] ** 2 + sum(-4.0 * exp(-1.5 * hypot(*(xy - person)) ** 2) for person in people)
@@ -72,7 +72,7 @@ def test_a_new_term_joins_the_likelihood_without_touching_anything():
     assert egg.gradient[3] + egg.gradient[4] == pytest.approx(round_one.gradient[3], rel=1e-9)
 
 
-def test_what_is_not_named_keeps_its_initial_value():
+def test_parameters_that_are_not_named_keep_their_initial_values():
     assert Reward.named({"a_p": 2}).theta == (-50.0, -0.01, 2.0, 2.0)
     assert [parameter.name for parameter in Reward.named({}).parameters] == ["c0", "a_g", "a_p", "sigma_p"]
 
@@ -91,6 +91,6 @@ def test_what_is_not_named_keeps_its_initial_value():
         ),
     ],
 )
-def test_what_is_no_reward_is_refused(make_it, message):
+def test_invalid_rewards_are_refused(make_it, message):
     with pytest.raises(RewardError, match=message):
         make_it()

@@ -55,7 +55,7 @@ def test_a_path_that_is_hardly_longer_is_not_nominal():
     assert scene.nominal.sum() == 300
 
 
-def test_the_nominal_line_is_straight_when_nothing_is_in_between():
+def test_the_nominal_line_is_straight_without_obstacles():
     scene = make.scene_on(make.open_grid(40, 30), [2, 3], [36, 21])
     assert scene.nominal_line_m() == pytest.approx(np.array([[0.25, 0.35], [3.65, 2.15]]))
 
@@ -99,7 +99,7 @@ def test_avoidance_keeps_clear_of_people_and_leaves_the_nominal_path_no_further_
     assert oracles.length_by_steps(avoidance_line_m(free, 0.5)) == pytest.approx(3.7)
 
 
-def test_avoidance_without_a_way_says_so():
+def test_avoidance_without_a_path_is_an_error():
     scene = make.scene_on(make.open_grid(40, 5), [1, 2], [38, 2], [[2.0, 0.25]])
     with pytest.raises(
         SceneError, match=r"goal unreachable: no free path on the map from x 0\.15 m, y 0\.25 m to x 3\.85"
@@ -121,12 +121,12 @@ def test_a_goal_behind_a_wall_is_unreachable():
         make.scene_on(grid, [0, 0], [7, 0])
 
 
-def test_a_start_in_the_goal_is_nothing_to_plan():
+def test_a_start_in_the_goal_is_refused():
     with pytest.raises(SceneError, match=r"start and goal lie in the same cell at x 0\.15 m, y 0\.05 m"):
         make.scene_on(make.grid_of("..."), [1, 0], [1, 0])
 
 
-def test_equal_scenes_are_one_object_wherever_they_stand():
+def test_equal_scenes_are_one_object():
     grid, there, back = make.open_grid(4, 2), [[0, 0], [1, 0], [2, 0]], [[2, 0], [1, 0], [0, 0]]
     person = [[0.2, 0.2]]
     copy = Grid(grid.occupied.copy(), grid.resolution_m, grid.origin_m)

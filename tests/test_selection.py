@@ -35,7 +35,7 @@ ALL = (PUSHED, LEFT_ALONE, STICK)
         ({"steps": Steps.CONTACT}, (PUSHED,)),
     ],
 )
-def test_the_demonstrations_that_are_asked_for(choice, expected):
+def test_the_requested_demonstrations_are_selected(choice, expected):
     found = select(ALL, **choice)
     assert [one.id for one in found.demonstrations] == [one.id for one in expected]
     assert found.resolution_m == 0.1
@@ -47,7 +47,7 @@ def test_steps_in_contact_are_fewer_than_all_steps():
     assert select([PUSHED], steps=Steps.CONTACT).evidence.steps == 2
 
 
-def test_an_unknown_intervention_is_not_taken_for_none():
+def test_an_unknown_intervention_is_not_treated_as_no_intervention():
     with pytest.raises(
         DemonstrationError, match=r"^`only_corrected`: expected demonstrations with a wrench, found p1/4"
     ):
@@ -55,7 +55,7 @@ def test_an_unknown_intervention_is_not_taken_for_none():
     select([PUSHED, UNKNOWN])
 
 
-def test_nothing_left_is_refused():
+def test_an_empty_selection_is_refused():
     with pytest.raises(DemonstrationError, match=r"^`cycle`: expected one of 'cycle 1', .*found 'cycle 7'"):
         select(ALL, cycle=7)
     with pytest.raises(

@@ -41,7 +41,7 @@ def test_systems_against_dense_solves(seed, transposed, krylov, monkeypatch):
         assert np.abs(found - np.linalg.solve(matrix, right)).max() < 1e-11
 
 
-def test_the_first_term_and_a_sweep_are_what_they_say():
+def test_the_first_term_and_a_sweep_against_dense_products():
     splitting, whole, rng = split_at_random(2)
     lower, upper = np.tril(whole), np.triu(whole)
     x = rng.normal(size=len(whole))
@@ -215,7 +215,7 @@ def test_extreme_parameters_against_value_iteration(theta):
     assert visits[scene.goal] == pytest.approx(1.0, abs=1e-9)
 
 
-def test_the_reason_crosses_process_borders():
+def test_the_reason_is_passed_between_processes():
     error = InfinitePartitionError(ValueStatus.UNDECIDED)
     kind, arguments = error.__reduce__()
     assert str(kind(*arguments)) == str(error)
@@ -230,7 +230,7 @@ def test_the_reason_crosses_process_borders():
         (-50.0, 0.0, 30.0, 2.0),
     ],
 )
-def test_what_is_infinite_is_called_so_and_soon(theta, monkeypatch):
+def test_an_infinite_partition_function_is_reported_after_few_sweeps(theta, monkeypatch):
     monkeypatch.setattr(series, "MAX_SWEEPS", 100)
     scene = make.scene_on(make.open_grid(30, 20), [2, 10], [27, 10], [[1.5, 1.0]])
     assert attempt(Reward(theta), scene) == (None, ValueStatus.INFINITE)

@@ -22,7 +22,7 @@ def test_visits_are_those_of_the_policy_from_the_scenes_start():
     np.testing.assert_array_equal(found.reward_by_cell, REWARD.by_cell(scene))
 
 
-def test_it_crosses_process_borders():
+def test_it_is_passed_between_processes():
     found = solved(REWARD, make.scene_on(make.open_grid(8, 5), [0, 2], [7, 2], [[0.4, 0.3]]))
     again = pickle.loads(pickle.dumps(found))
     np.testing.assert_array_equal(again.visits, found.visits)

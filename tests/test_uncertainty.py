@@ -17,13 +17,13 @@ ROOT = np.array([[2.0, 0, 0], [0.5, 1.0, 0], [-0.3, 0.4, 0.7]])
 INFORMATION = ROOT @ ROOT.T
 
 
-def test_where_all_is_told_the_covariance_is_the_inverse():
+def test_with_all_parameters_identified_the_covariance_is_the_inverse():
     covariance, blind = observed(INFORMATION, NONE, ALL)
     assert covariance == pytest.approx(np.linalg.inv(INFORMATION))
     assert not blind.any()
 
 
-def test_what_is_not_told_has_no_covariance_and_is_not_asked_for():
+def test_inactive_parameters_have_no_covariance():
     told = np.array([True, False, True])
     covariance, blind = observed(INFORMATION, NONE, told)
     block = np.ix_(told, told)
@@ -36,7 +36,7 @@ def test_what_is_not_told_has_no_covariance_and_is_not_asked_for():
     assert not blind.any()
 
 
-def test_a_direction_that_nothing_tells_blinds_those_who_take_part():
+def test_a_direction_without_information_makes_its_parameters_blind():
     # Only the sum of the last two is told: their difference is a blind direction.
     information = np.array([[4.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
     covariance, blind = observed(information, NONE, ALL)
@@ -46,7 +46,7 @@ def test_a_direction_that_nothing_tells_blinds_those_who_take_part():
     assert np.isnan(covariance[:, 1:]).all()
 
 
-def test_the_regulariser_tells_nothing_but_makes_what_is_told_surer():
+def test_the_regulariser_identifies_no_parameter_but_lowers_the_variance():
     information = np.array([[4.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
     covariance, blind = observed(information + 0.5 * np.eye(3), 0.5 * np.eye(3), ALL)
     assert blind.tolist() == [False, True, True]
@@ -80,7 +80,7 @@ def test_the_sandwich_against_a_loop(participants):
     assert clustered(covariance, scores, participants) == pytest.approx(sandwich(covariance, scores, participants))
 
 
-def test_the_sandwich_leaves_out_what_has_no_covariance():
+def test_the_sandwich_leaves_out_parameters_without_covariance():
     scores = np.random.default_rng(4).normal(size=(5, 3))
     holes = np.full((3, 3), np.nan)
     holes[:2, :2] = np.linalg.inv(INFORMATION[:2, :2])
@@ -90,11 +90,11 @@ def test_the_sandwich_leaves_out_what_has_no_covariance():
     assert np.isnan(robust[:, 2]).all()
 
 
-def test_one_participant_does_not_scatter():
+def test_one_participant_has_no_scatter():
     assert clustered(np.eye(3), np.ones((4, 3)), ["a"] * 4) is None
 
 
-def test_alike_participants_do_not_scatter_though_their_demonstrations_do():
+def test_equal_participants_have_no_scatter_although_their_demonstrations_have():
     scores = np.array([[1.0, 0, 0], [-1.0, 0, 0], [2.0, 1, 0], [-2.0, -1, 0]])
     assert clustered(np.eye(3), scores, list("aabb")) == pytest.approx(np.zeros((3, 3)))
     assert clustered(np.eye(3), scores, list("abab"))[0, 0] == pytest.approx(2 * (3**2 + 3**2))
@@ -109,7 +109,7 @@ def test_correlations():
 
 
 @pytest.mark.parametrize("r", [0.0, 0.5, -0.9])
-def test_the_condition_number_of_two_is_known_and_does_not_know_units(r):
+def test_the_condition_number_of_two_parameters_is_independent_of_units(r):
     # The eigenvalues of [[1, r], [r, 1]] are 1 + |r| and 1 - |r|.
     for units in ([1.0, 1.0], [1e3, 1e-4]):
         covariance = np.array([[1.0, r], [r, 1.0]]) * np.outer(units, units)
@@ -148,7 +148,7 @@ def test_participants_who_do_differ_make_the_clustered_errors_larger():
     assert found.clustered_errors[2] > 2 * found.standard_errors[2]
 
 
-def test_a_participant_none_of_whose_steps_is_left_is_none():
+def test_a_participant_without_selected_steps_does_not_count():
     scene = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4], [[0.8, 0.4]])
     demonstrations = make.by_participants(scene, Reward((-32.0, -2.0, -4.0, 3.0)), 3, 8, seed=2)
     evidence = evidence_of(demonstrations)
@@ -164,7 +164,7 @@ def test_a_participant_none_of_whose_steps_is_left_is_none():
             assert found.clustered == pytest.approx(expected.clustered, rel=1e-6)
 
 
-def test_what_only_a_prior_tells_is_no_surer_by_participant_than_the_prior():
+def test_parameters_identified_by_a_prior_alone_have_its_error_by_participant():
     nobody = make.scene_on(make.open_grid(16, 9), [0, 4], [15, 4])
     evidence = evidence_of(make.by_participants(nobody, Reward((-35.0, -2.0, 0.0, 1.0)), 5, 6, seed=3))
     prior = Prior.gaussian(np.array([0.0, 0.0, -3.0, 2.5]), np.diag([np.nan, np.nan, 0.25, 0.04]))

@@ -114,7 +114,7 @@ def test_errors_notes_and_results_pass_the_boundary(navirl, monkeypatch):
         ("", []),
     ],
 )
-def test_names_that_are_spelled_alike_or_hold_a_name_are_near(name, near):
+def test_names_that_contain_a_name_or_have_similar_spelling_are_near(name, near):
     assert nearest(name, ["p01/1", "p01/3", "force, cycle 1", "length_m"]) == near
 
 
@@ -137,7 +137,7 @@ def test_names_that_are_spelled_alike_or_hold_a_name_are_near(name, near):
         ),
     ],
 )
-def test_what_a_message_says_of_an_unknown_name(what, name, known, message):
+def test_the_message_for_an_unknown_name(what, name, known, message):
     assert unknown(what, name, known) == message
 
 

@@ -91,7 +91,7 @@ def test_expected_features_are_those_of_the_learnt_policy(eight, validated):
     assert validated.expected[2, 0] / 6 == pytest.approx(np.mean(lengths), abs=4 * error)
 
 
-def test_the_true_model_foretells_better_than_simpler_ones(validated):
+def test_the_true_model_predicts_better_than_simpler_ones(validated):
     order = ["learnt", "no person", "uniform"]
     values = [validated.per_step(model) for model in order]
     assert values[0] > values[1] + 0.1 > values[2] + 0.2
@@ -99,7 +99,7 @@ def test_the_true_model_foretells_better_than_simpler_ones(validated):
     assert list(validated.log_likelihoods) == ["learnt", "no person", "shortest path", "uniform"]
 
 
-def test_people_who_are_alike_miss_each_other_by_about_one_standard_error(validated):
+def test_equal_participants_mispredict_by_about_one_standard_error(validated):
     root = np.sqrt((validated.mismatch**2).mean(axis=0))
     assert (root > 0.5).all()
     assert (root < 2.0).all()
@@ -108,7 +108,7 @@ def test_people_who_are_alike_miss_each_other_by_about_one_standard_error(valida
     )
 
 
-def test_people_who_differ_miss_each_other_by_more():
+def test_different_participants_mispredict_by_more():
     unlike = []
     for number, a_p in enumerate((-1.0, -9.0, -2.0, -8.0, -1.0, -9.0)):
         paths = make.drawn(SCENE, Reward((-32.0, -0.8, a_p, 3.0)), 15, seed=number)
@@ -117,7 +117,7 @@ def test_people_who_differ_miss_each_other_by_more():
     assert np.sqrt((found.mismatch[:, 2] ** 2).mean()) > 2.0
 
 
-def test_where_people_have_no_effect_the_simpler_model_foretells_as_well():
+def test_without_effect_of_people_the_simpler_model_predicts_as_well():
     evidence = evidence_of(mixed(Reward((-32.0, -0.8, 0.0, 3.0)), 5, 12, seed=6))
     found = cross_validate(evidence, START, 1e-3, executor=Here())
     assert found.per_step("learnt") == pytest.approx(found.per_step("no person"), abs=0.01)
@@ -144,14 +144,14 @@ def test_one_participant_cannot_be_left_out():
         cross_validate(evidence, START, 0.0)
 
 
-def test_a_participant_none_of_whose_steps_is_left_is_not_left_out(eight):
+def test_a_participant_without_selected_steps_is_not_left_out(eight):
     evidence = evidence_of(eight)
     some = evidence.only([np.full(len(one.cells) - 1, one.participant < "p04") for one in eight])
     found = cross_validate(some, START, 1e-3, executor=Here())
     assert found.participants == ("p01", "p02", "p03")
 
 
-def test_what_the_others_do_not_tell_is_said_and_foretells_nothing():
+def test_a_parameter_that_the_others_do_not_identify_is_reported_and_gives_no_prediction():
     alone = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4])
     met = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
     truth = Reward((-32.0, -4.0, -4.0, 3.0))

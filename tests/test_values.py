@@ -144,7 +144,7 @@ def bands(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_bands_change_nothing(seed, bands, monkeypatch):
+def test_bands_do_not_change_the_values(seed, bands, monkeypatch):
     rng = np.random.default_rng(100 + seed)
     scene = make.random_scene(rng, 40, 25, density=(0.0, 0.25)[seed % 2], people=1)
     reward = Reward((-rng.uniform(25, 60), -0.3, (-6.0, 0.4)[seed % 2], 1.5))
@@ -224,7 +224,7 @@ def spectral_radius(scene, reward):
     return norm
 
 
-def test_between_finite_and_infinite_it_is_decided_rightly():
+def test_the_boundary_between_finite_and_infinite_is_decided_correctly():
     scene = make.scene_on(make.open_grid(11, 8), [2, 4], [9, 4])
     seen = set()
     for c0 in np.arange(-18.5, -15.0, 0.1):
@@ -252,7 +252,7 @@ def test_between_finite_and_infinite_it_is_decided_rightly():
         ((-50.0, 0.0, 2000.0, 2.0), [[1.5, 1.0]]),
     ],
 )
-def test_an_infinite_partition_function_is_said(theta, people):
+def test_an_infinite_partition_function_is_reported(theta, people):
     scene = make.scene_on(make.open_grid(30, 20), [2, 10], [27, 10], people)
     with pytest.raises(
         InfinitePartitionError,
