@@ -227,7 +227,7 @@ def fit(
             initial values.
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
             the parameters that the prior determines. 0 for none.
-        method: "newton" (trust region, two starts) or the paper's gradient ascent, "adam".
+        method: "newton" (trust region, and a scan of sigma_p for other maxima) or the paper's gradient ascent, "adam".
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.

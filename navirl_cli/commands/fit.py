@@ -95,7 +95,8 @@ from navirl_cli.reports.fit import remarks, report, warnings
         type=Choice([method.value for method in Method]),
         default=Method.NEWTON.value,
         show_default=True,
-        help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam); both with exact gradients.",
+        help="Trust-region Newton and a scan for other maxima, or the paper's gradient ascent (Adam); both with exact "
+        "gradients.",
     ),
     click.option(
         "--correct-bias",
@@ -149,7 +150,7 @@ def fit(
     """Learn a navigation reward from demonstrations.
 
     Exact maximum-entropy inverse reinforcement learning. Linear systems give soft values, expected visits and
-    derivatives; a trust-region Newton method from two starts gives the maximum; the observed information gives
+    derivatives; a trust-region Newton method and a scan over sigma_p give the maximum; the observed information gives
     standard errors.
     """
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)

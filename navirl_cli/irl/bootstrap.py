@@ -108,7 +108,7 @@ def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
                 found.l2,
                 prior=found.prior,
                 method=found.method,
-                restarts=False,
+                scan=False,
             )
         except (InfinitePartitionError, DemonstrationError):
             results.append(None)

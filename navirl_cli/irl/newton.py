@@ -19,6 +19,9 @@ GAIN_TOLERANCE = 1e-9
 #: Initial radius of the first search, and of the others, which soon test whether they converge to the same maximum.
 FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
 MAX_RADIUS = 16.0
+#: In a search for a value of interest: promise at which it ends, nats, its share of what is missing, and the radius of
+#: the step that is asked.
+COARSE, HOPE, FAR_RADIUS = 1e-3, 3.0, 1e3
 #: A search this many nats below a known maximum is tested for convergence to it. Its predicted end may differ from the
 #: maximum by so much in place (every variable, or nats) and by so much in value (nats).
 NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
@@ -59,6 +62,7 @@ def maximise(
     free: NDArray[np.bool_],
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
+    hope: float | None = None,
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -69,15 +73,19 @@ def maximise(
         free: (k,) variables that may move.
         progress: Called with every accepted value.
         known: Maxima found before. The search ends early where it is converging to one of them.
+        hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
+            within a coarse tolerance.
 
     Returns:
         The maximum and the accepted places before it.
     """
     lower, upper = bounds
-    here, path, radius = start, [start], AGAIN_RADIUS if known else FIRST_RADIUS
+    here, path, radius = start, [start], AGAIN_RADIUS if known or hope is not None else FIRST_RADIUS
     converged = blocked = False
     while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
+            break
+        if hope is not None and _settled(here, hope, bounds, free):
             break
         step = _step(here, lower, upper, free, radius)
         promised = _promise(here, step)
@@ -102,6 +110,30 @@ def maximise(
                 progress(here.value)
     path_arrays = np.array([point.x for point in path]), np.array([point.value for point in path])
     return Maximum(here, converged, blocked, *path_arrays)
+
+
+def prolonged(
+    here: Point, j: int, value: float, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]
+) -> FloatArray:
+    """Where the maximum over the others is expected when variable j, which is positive, takes another value.
+
+    By the quadratic model at the present maximum, along the logarithm of the variable.
+    """
+    others = free & (np.arange(len(here.x)) != j)
+    moved = here.gradient + here.hessian[:, j] * here.x[j] * np.log(value / here.x[j])
+    step = _step(Point(here.x, here.value, moved, here.hessian), *bounds, others, AGAIN_RADIUS)
+    x: FloatArray = np.where(np.arange(len(here.x)) == j, value, here.x + step)
+    return x
+
+
+def _settled(here: Point, hope: float, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
+    """Whether a concave climb is near its end, or will end below a value: several times its promise does not reach it.
+
+    A self-concordant function gains at most -d - ln(1 - d) with d^2/2 the promise of Newton's step (Nesterov 2004,
+    Introductory Lectures on Convex Optimization, Thm. 4.1.11): less than three times the promise up to d = 0.83.
+    """
+    promised = _promise(here, _step(here, *bounds, free, FAR_RADIUS))
+    return promised < max(COARSE, (hope - here.value) / HOPE)
 
 
 def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
@@ -157,8 +189,10 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
     slope = basis.T @ gradient
     steepest = float(curvature[-1])
     if steepest < 0:
-        step = -slope / curvature
-        if float(step @ step) <= radius**2:
+        with np.errstate(over="ignore"):  # a flat direction asks for an endless step, which the radius limits
+            step = -slope / curvature
+            length = float(step @ step)
+        if length <= radius**2:
             full: FloatArray = basis @ step
             return full
     # |p(shift)| falls from infinity to 0 as the shift grows above the largest curvature; 1/|p| is nearly linear in it.

@@ -104,14 +104,19 @@ class Objective:
         identified: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
         return identified
 
-    def starts(self, first: Point) -> list[FloatArray]:
-        """The starts besides the first: from the restarts of the parameters that have restarts."""
-        starts = []
-        for number in range(max((len(parameter.restarts) for parameter in self.initial.parameters), default=0)):
-            x = first.x.copy()
-            for j, parameter in enumerate(self.initial.parameters):
-                if number < len(parameter.restarts):
-                    x[j] = parameter.restarts[number] / parameter.scale
-            if (x != first.x).any():
-                starts.append(x)
-        return starts
+    def scans(self) -> list[tuple[int, tuple[float, ...]]]:
+        """Numbers of the parameters that enter non-linearly, each with the values to scan, in units of its scale."""
+        return [
+            (j, tuple(value / one.scale for value in one.scan))
+            for j, one in enumerate(self.initial.parameters)
+            if one.scan
+        ]
+
+    def scan_ends(self, first: Point) -> list[Point]:
+        """The first place with a scanned parameter at the ends of its scan, where there is a policy."""
+        ends = [
+            self(np.where(np.arange(len(first.x)) == j, value, first.x))
+            for j, values in self.scans()
+            for value in (values[0], values[-1])
+        ]
+        return [point for point in ends if np.isfinite(point.value)]
