@@ -124,7 +124,7 @@ def fit(
         InfinitePartitionError: The partition function is infinite at the initial parameters.
         RewardError: l2 is negative, the prior is of other parameters, or a fixed parameter is unknown.
     """
-    objective = _objective(evidence, initial, l2, prior)
+    objective = Objective.of(evidence, initial, l2, prior)
     first = objective(objective.to_units(initial.theta))
     if not np.isfinite(first.value):
         log_likelihood(evidence, initial)  # raises with the reason
@@ -151,18 +151,6 @@ def fit(
     else:
         found = _by_newton(objective, first, free, scan, count)
     return _as_fit(objective, found, first, influential, held, (method, l2, prior))
-
-
-def _objective(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> Objective:
-    """The objective of a fit."""
-    regulariser = Prior.l2(initial.parameters, l2)
-    if prior is None:
-        return Objective(evidence, initial, regulariser, regulariser)
-    if len(prior.shift) != len(initial.theta):
-        names = ", ".join(parameter.name for parameter in initial.parameters)
-        raise RewardError(f"`prior`: expected one of {names}, found one of {len(prior.shift)} parameters")
-    regulariser = regulariser.where(~prior.known)
-    return Objective(evidence, initial, regulariser + prior, regulariser)
 
 
 def _as_fit(

@@ -18,10 +18,11 @@ MAX_ITERATIONS = 200
 GAIN_TOLERANCE = 1e-9
 #: Initial radius of the first search, and of the others, which soon test whether they converge to the same maximum.
 FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
-MAX_RADIUS = 16.0
-#: In a search for a value of interest: promise at which it ends, nats, its share of what is missing, and the radius of
-#: the step that is asked.
-COARSE, HOPE, FAR_RADIUS = 1e-3, 3.0, 1e3
+#: Largest radius: an ascent without end, as that of a_p with few data, reaches a bound in a few steps. A search is
+#: tested against known maxima with a step of the other radius.
+MAX_RADIUS, TEST_RADIUS = 1e4, 16.0
+#: In a search for a value of interest: promise at which it ends, nats, and its share of what is missing.
+COARSE, HOPE = 1e-3, 3.0
 #: A search this many nats below a known maximum is tested for convergence to it. Its predicted end may differ from the
 #: maximum by so much in place (every variable, or nats) and by so much in value (nats).
 NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
@@ -112,17 +113,21 @@ def maximise(
     return Maximum(here, converged, blocked, *path_arrays)
 
 
-def prolonged(
-    here: Point, j: int, value: float, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]
+def moved(
+    here: Point, j: int, step: float, bounds: tuple[FloatArray, FloatArray], others: NDArray[np.bool_]
 ) -> FloatArray:
-    """Where the maximum over the others is expected when variable j, which is positive, takes another value.
+    """Where the maximum over other variables is expected after a step of variable j, by the quadratic model here.
 
-    By the quadratic model at the present maximum, along the logarithm of the variable.
+    Args:
+        here: The maximum over the other variables at the present value of variable j.
+        j: Number of the variable.
+        step: Of that variable.
+        bounds: (k,) lower and upper ones.
+        others: (k,) variables that may move.
     """
-    others = free & (np.arange(len(here.x)) != j)
-    moved = here.gradient + here.hessian[:, j] * here.x[j] * np.log(value / here.x[j])
-    step = _step(Point(here.x, here.value, moved, here.hessian), *bounds, others, AGAIN_RADIUS)
-    x: FloatArray = np.where(np.arange(len(here.x)) == j, value, here.x + step)
+    pulled = Point(here.x, here.value, here.gradient + here.hessian[:, j] * step, here.hessian)
+    x: FloatArray = here.x + _step(pulled, *bounds, others, AGAIN_RADIUS)
+    x[j] = here.x[j] + step
     return x
 
 
@@ -132,7 +137,7 @@ def _settled(here: Point, hope: float, bounds: tuple[FloatArray, FloatArray], fr
     A self-concordant function gains at most -d - ln(1 - d) with d^2/2 the promise of Newton's step (Nesterov 2004,
     Introductory Lectures on Convex Optimization, Thm. 4.1.11): less than three times the promise up to d = 0.83.
     """
-    promised = _promise(here, _step(here, *bounds, free, FAR_RADIUS))
+    promised = _promise(here, _step(here, *bounds, free, MAX_RADIUS))
     return promised < max(COARSE, (hope - here.value) / HOPE)
 
 
@@ -140,7 +145,7 @@ def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], f
     """Whether a full step from here ends at a known maximum, by place and by value."""
     if here.value < top.value - NEAR:
         return False
-    step = _step(here, *bounds, free, MAX_RADIUS)
+    step = _step(here, *bounds, free, TEST_RADIUS)
     away = here.x + step - top.x
     apart = -0.5 * float(away @ top.hessian @ away)
     # In units or in nats: around a flat maximum, places far apart may have the same value.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.likelihood import likelihood, value_and_gradient
 from navirl_cli.irl.newton import Point
@@ -30,6 +31,22 @@ class Objective:
     evaluations: int = field(default=0, init=False)
     #: Scores by demonstration at every place where it was called.
     _scores: dict[bytes, FloatArray] = field(default_factory=dict, init=False)
+
+    @staticmethod
+    def of(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> "Objective":
+        """The objective of a fit; arguments as of :func:`navirl_cli.irl.fit.fit`.
+
+        Raises:
+            RewardError: l2 is negative, or the prior is of other parameters.
+        """
+        regulariser = Prior.l2(initial.parameters, l2)
+        if prior is None:
+            return Objective(evidence, initial, regulariser, regulariser)
+        if len(prior.shift) != len(initial.theta):
+            names = ", ".join(parameter.name for parameter in initial.parameters)
+            raise RewardError(f"`prior`: expected one of {names}, found one of {len(prior.shift)} parameters")
+        regulariser = regulariser.where(~prior.known)
+        return Objective(evidence, initial, regulariser + prior, regulariser)
 
     @property
     def scale(self) -> FloatArray:

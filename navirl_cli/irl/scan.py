@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.irl.newton import Maximum, Point, maximise, prolonged
+from navirl_cli.irl.newton import Maximum, Point, maximise, moved
 
 #: Between two values the profile is taken to stay below the cubic through its values and slopes plus this, in nats, and
 #: plus this share of the cubic's rise above the lower value.
@@ -43,6 +43,8 @@ class Scan:
     progress: Callable[[float], None] | None
     #: Maxima found so far.
     found: list[Maximum]
+    #: How far below the best place a value of the profile is still of interest, nats.
+    fall: float = 0.0
     _seen: dict[float, _Place] = field(default_factory=dict, init=False)
 
     @property
@@ -59,13 +61,17 @@ class Scan:
         for _ in range(ROUNDS if len(scans) > 1 else 1):
             before = self.top
             for j, values in scans:
-                self._follow(j, values)
+                self.follow(j, values)
                 self._climb(j)
             if self.top is before:
                 break
 
-    def _follow(self, j: int, values: Sequence[float]) -> None:
-        """Follow the profile from the best place to both sides: every second value, and those between where needed."""
+    def follow(self, j: int, values: Sequence[float]) -> list[Point]:
+        """Follow the profile from the best place to both sides: every second value, and those between where needed.
+
+        Returns:
+            The places on the profile that are of interest, by the variable, ascending.
+        """
         here = float(self.top.x[j])
         self._seen = {here: _Place(self.top, 0.0)}
         above, below = [v for v in values if v > here], [v for v in values if v < here][::-1]
@@ -76,18 +82,22 @@ class Scan:
         for value in (*above, *below):
             if value not in self._seen:
                 low, high = max(v for v in self._seen if v < value), min(v for v in self._seen if v > value)
-                if here in {low, high} or self._peak(low, high) > self.top.value:
+                if here in {low, high} or self._peak(low, high) > self.top.value - self.fall:
                     self._visit(j, value)
+        places = [one.point for _, one in sorted(self._seen.items())]
+        return [point for point in places if point.value >= self.top.value - self.fall]
 
     def _visit(self, j: int, value: float) -> None:
         """The best of the other variables at a value of this one; nothing where there is no policy."""
         last = self._seen[min(self._seen, key=lambda other: abs(np.log(other / value)))].point
-        begin = self.objective(prolonged(last, j, value, self.bounds, self.free))
+        others = self.free & (np.arange(len(last.x)) != j)
+        # Along the logarithm of the variable the best of the others moves more evenly.
+        x = moved(last, j, float(last.x[j] * np.log(value / last.x[j])), self.bounds, others)
+        begin = self.objective(np.where(np.arange(len(x)) == j, value, x))
         if not np.isfinite(begin.value):
-            begin = self.objective(np.where(np.arange(len(last.x)) == j, value, last.x))
+            begin = self.objective(np.where(np.arange(len(x)) == j, value, last.x))
         if np.isfinite(begin.value):
-            others = self.free & (np.arange(len(last.x)) != j)
-            point = maximise(self.objective, begin, self.bounds, others, hope=self.top.value).best
+            point = maximise(self.objective, begin, self.bounds, others, hope=self.top.value - self.fall).best
             self._seen[value] = _Place(point, float(point.gradient[j]) * value)
 
     def _climb(self, j: int) -> None:
