@@ -107,7 +107,7 @@ def validation_document(found: "Validation") -> dict[str, Any]:
             model: {
                 "log_likelihood": numbers(values),
                 "log_likelihood_per_step": number(found.per_step(model)),
-                "parameters": found.sizes[model],
+                "parameter_count": found.sizes[model],
             }
             for model, values in found.log_likelihoods.items()
         },

@@ -27,6 +27,8 @@ FEW_DEMONSTRATIONS = 10
 LEVEL = 0.95
 #: Tolerance of the fall at an end, as a share of it, and the largest number of values tried for it.
 END_TOLERANCE, END_TRIES = 0.01, 40
+#: Largest number of steps of the climb at a value. Along a curved ridge a climb takes many for little.
+MOST_STEPS = 40
 #: How often an end is moved on because another branch of the other parameters reaches farther.
 BRANCHES = 5
 
@@ -255,7 +257,7 @@ class _Profiler:
             begin = self.objective(np.where(np.arange(len(guess.x)) == j, value, guess.x))
         if not isfinite(begin.value):
             return begin
-        self.seen.append(maximise(self.objective, begin, self.objective.bounds, others).best)
+        self.seen.append(maximise(self.objective, begin, self.objective.bounds, others, most=MOST_STEPS).best)
         return self.seen[-1]
 
     def _crossing(self, j: int, fall: float, inside: Point, outside: Point) -> Point:
@@ -280,8 +282,8 @@ class _Profiler:
         if not scans:
             return None
         search = Scan(self.objective, self.objective.bounds, others, None, [_known(end)])
-        search.over(scans)
-        return search.top if search.top.value > self.top.value - fall * (1 - 2 * END_TOLERANCE) else None
+        best = max((place for i, values in scans for place in search.follow(i, values)), key=lambda one: one.value)
+        return best if best.value > self.top.value - fall * (1 - 2 * END_TOLERANCE) else None
 
     def _within(self, place: Point, fall: float) -> bool:
         return place.value >= self.top.value - fall

@@ -22,7 +22,8 @@ FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
 #: tested against known maxima with a step of the other radius.
 MAX_RADIUS, TEST_RADIUS = 1e4, 16.0
 #: In a search for a value of interest: promise at which it ends, nats, and its share of what is missing.
-COARSE, HOPE = 1e-3, 3.0
+#: Its initial radius, as a share of the length of its start.
+COARSE, HOPE, WIDE = 1e-3, 3.0, 0.25
 #: A search this many nats below a known maximum is tested for convergence to it. Its predicted end may differ from the
 #: maximum by so much in place (every variable, or nats) and by so much in value (nats).
 NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
@@ -64,6 +65,7 @@ def maximise(
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
     hope: float | None = None,
+    most: int | None = None,
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -76,14 +78,17 @@ def maximise(
         known: Maxima found before. The search ends early where it is converging to one of them.
         hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
             within a coarse tolerance.
+        most: Largest number of steps; by default MAX_ITERATIONS.
 
     Returns:
         The maximum and the accepted places before it.
     """
     lower, upper = bounds
-    here, path, radius = start, [start], AGAIN_RADIUS if known or hope is not None else FIRST_RADIUS
+    here, path, radius = start, [start], FIRST_RADIUS if not known and hope is None else AGAIN_RADIUS
+    if hope is not None:
+        radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
-    while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
+    while len(path) <= (MAX_ITERATIONS if most is None else most) and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
             break
         if hope is not None and _settled(here, hope, bounds, free):

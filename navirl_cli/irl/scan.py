@@ -80,10 +80,12 @@ class Scan:
             for value in side[:1] + side[1:][::-2][::-1]:
                 self._visit(j, value)
         for value in (*above, *below):
-            if value not in self._seen:
-                low, high = max(v for v in self._seen if v < value), min(v for v in self._seen if v > value)
-                if here in {low, high} or self._peak(low, high) > self.top.value - self.fall:
-                    self._visit(j, value)
+            # Where there is no policy, a value has no neighbour on one side.
+            low = max((v for v in self._seen if v <= value), default=here)
+            high = min((v for v in self._seen if v >= value), default=here)
+            near = here in {low, high} or self._peak(low, high) > self.top.value - self.fall
+            if value not in self._seen and near:
+                self._visit(j, value)
         places = [one.point for _, one in sorted(self._seen.items())]
         return [point for point in places if point.value >= self.top.value - self.fall]
 

@@ -275,7 +275,7 @@ def _held_out_table(found: Mapping[str, Any]) -> Table:
         rows.append(
             (
                 model,
-                one.get("parameters"),
+                one.get("parameter_count"),
                 one["log_likelihood_per_step"],
                 float(paired.mean()) if known else None,
                 float(paired.std(ddof=1) / np.sqrt(len(paired))) if known else None,
