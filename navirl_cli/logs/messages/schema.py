@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 from rosbags.interfaces import Nodetype
@@ -38,6 +38,10 @@ _SEPARATOR: Final = "=" * 80 + "\n"
 _PARSER_ERRORS: Final = (TypesysError, SyntaxError, LookupError, ValueError, TypeError, AttributeError, AssertionError)
 #: Most entries of a fixed array of texts or messages, for each of which rosbags generates code; and of numbers.
 _MAX_WRITTEN_OUT, _MAX_ARRAY = 1000, 1 << 28
+#: Most fields of a definition for which rosbags generates code, in a time that grows with their square.
+_MAX_GENERATED: Final = 5000
+#: Most messages within messages within messages.
+_MAX_NESTED: Final = 50
 #: The field that rosbags gives to a message without fields: a byte in CDR, nothing in ROS 1.
 _FILLER: Final = "structure_needs_at_least_one_member"
 
@@ -74,17 +78,36 @@ class Leaf:
 
 @dataclass(frozen=True, eq=False)
 class Schema:
-    """A message type with every type that it contains, in a store of its own."""
+    """A message type with every type that it contains."""
 
     #: Full name, "geometry_msgs/msg/WrenchStamped".
     name: str
-    store: Typestore
+    #: Constants and fields by the name of the type, of this type and of all that the definition contains.
+    types: Typesdict
     #: How payloads are encoded, "cdr" or "ros1".
     encoding: str = "cdr"
 
+    @cached_property
+    def store(self) -> Typestore:
+        """The types with the code that decodes them, which is generated when the first message needs it.
+
+        Raises:
+            DecodeError: rosbags cannot generate code for the types.
+        """
+        count = sum(len(fields) for _, fields in self.types.values())
+        if count > _MAX_GENERATED:
+            raise DecodeError(f"its definition has {count} fields; at most {_MAX_GENERATED} are decoded one by one")
+        store = get_typestore(Stores.EMPTY)
+        try:
+            store.register({name: one for name, one in self.types.items() if name not in store.fielddefs})
+            store.get_msgdef(self.name)
+        except (*_PARSER_ERRORS, RecursionError) as error:
+            raise DecodeError(f"no code for its definition ({_first_line(error)})") from error
+        return store
+
     def fields(self, typename: str) -> list[tuple[str, FieldDesc]]:
         """Names and types of the fields of a contained type, in the order of the bytes."""
-        fields = self.store.fielddefs[typename][1]
+        fields = self.types[typename][1]
         return fields if self.encoding == "cdr" else [one for one in fields if one[0] != _FILLER]
 
     def leaf(self, path: str) -> Leaf:
@@ -119,7 +142,8 @@ class Schema:
         Raises:
             DecodeError: It is not a message of this type.
         """
-        decode = self.store.deserialize_ros1 if self.encoding == "ros1" else self.store.deserialize_cdr
+        store = self.store
+        decode = store.deserialize_ros1 if self.encoding == "ros1" else store.deserialize_cdr
         try:
             return decode(payload, self.name)
         except SerdeError as error:
@@ -234,17 +258,32 @@ def parse_definition(name: str, encoding: str, text: str, message_encoding: str 
 
 @lru_cache(maxsize=256)
 def _parsed(full: str, encoding: str, text: str, message_encoding: str) -> Schema:
-    # a store with times only, which are primitives in ROS 1
-    store = get_typestore(Stores.EMPTY)
-    schema = Schema(full, store, message_encoding)
     try:
-        store.register(_types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, full))
+        found = _types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, full)
+        schema = Schema(full, _with_times(found), message_encoding)
         _check(schema)
-        store.get_msgdef(full)
     except (*_PARSER_ERRORS, RecursionError) as error:
-        first = (str(error).splitlines() or [""])[0][:120]
-        raise SchemaError(f"its definition does not parse ({type(error).__name__}: {first})") from error
+        raise SchemaError(f"its definition does not parse ({_first_line(error)})") from error
     return schema
+
+
+def _first_line(error: BaseException) -> str:
+    """The type of an error and the beginning of its first line."""
+    return f"{type(error).__name__}: {(str(error).splitlines() or [''])[0][:120]}"
+
+
+def _with_times(found: Typesdict) -> Typesdict:
+    """Parsed types, each with a field, and times, which are primitives in ROS 1.
+
+    Raises:
+        TypesysError: The text defines a time in another way.
+    """
+    times = get_typestore(Stores.EMPTY).fielddefs
+    for name in times.keys() & found.keys():
+        if [(field.lower(), desc) for field, desc in found[name][1]] != times[name][1]:
+            raise TypesysError(f"Type {name!r} is already present with different definition.")
+    filler: list[tuple[str, FieldDesc]] = [(_FILLER, (Nodetype.BASE, ("uint8", 0)))]
+    return {**{name: (constants, fields or filler) for name, (constants, fields) in found.items()}, **times}
 
 
 def full_name(name: str) -> str:
@@ -265,11 +304,15 @@ def _types_from_idl(text: str) -> Typesdict:
 
 def _check(schema: Schema) -> None:
     """Check that every type is defined, and that nothing keeps rosbags busy for ever."""
-    known = schema.store.fielddefs
+    known = schema.types
     fields = [(name, desc, _entry(desc)) for owner in known for name, desc in schema.fields(owner)]
     used = {entry[1] for _, _, entry in fields if entry[0] == Nodetype.NAME} | {schema.name}
     if missing := used - known.keys():
         raise TypesysError(f"no definition of {', '.join(sorted(map(str, missing)))}")
+    _check_nesting(schema)
+    for owner, (_, listed) in known.items():
+        # rosbags makes attributes of the fields
+        _check_names(owner, [name for name, _ in listed])
     for name, desc, entry in fields:
         number = entry[0] == Nodetype.BASE and entry[1][0] != "string"
         if number and entry[1][0] not in PRIMITIVES:
@@ -279,6 +322,33 @@ def _check(schema: Schema) -> None:
             raise TypesysError(f"{name} is an array of {size} entries")
         if desc[0] == Nodetype.SEQUENCE and entry[0] == Nodetype.NAME and not schema.fields(entry[1]):
             raise TypesysError(f"{name} is a sequence of messages without fields")
+
+
+def _check_nesting(schema: Schema) -> None:
+    """Check that no type contains itself, nor messages so deep that rosbags cannot follow."""
+    depths: dict[str, int] = {}
+
+    def depth(typename: str, above: tuple[str, ...]) -> int:
+        if typename in above:
+            raise TypesysError(f"{typename} contains itself")
+        if typename not in depths:
+            entries = [_entry(desc) for _, desc in schema.types[typename][1]]
+            inner = {str(entry[1]) for entry in entries if entry[0] == Nodetype.NAME}
+            depths[typename] = 1 + max((depth(one, (*above, typename)) for one in sorted(inner)), default=0)
+        if len(above) + depths[typename] > _MAX_NESTED:
+            raise TypesysError(f"{schema.name} holds messages in messages more than {_MAX_NESTED} deep")
+        return depths[typename]
+
+    depth(schema.name, ())
+
+
+def _check_names(owner: str, names: list[str]) -> None:
+    """Check that the fields of a type have different names, in Python too."""
+    taken: dict[str, str] = {}
+    for name in names:
+        other = taken.setdefault(normalize_fieldname(name), name)
+        if other is not name:
+            raise TypesysError(f"{owner} has conflicting Python names: {other!r} and {name!r}")
 
 
 def _entry(desc: FieldDesc) -> FieldDesc:
