@@ -6,7 +6,7 @@ import pytest
 
 from navirl_cli.errors import FrameError, LogError
 from navirl_cli.logs.findings import Kind
-from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import read
 from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.columns import Columns
@@ -106,6 +106,22 @@ def test_tf_alone(load):
     assert recording.notes == ("run.mcap: no odometry: poses are those of 'base_footprint' in tf",)
     check_true(recording, run, np.arange(201) / 10, (5.0, 0.0))
     assert recording.velocity_m_s is None
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 0.5])
+def test_tf_alone_without_a_wrench(load, ahead_s):
+    """Stamps of the frame that moves most often are the clock, not those of a localisation that stamps ahead."""
+    run = Run()
+    run.log.messages = [one for one in run.log.messages if one.topic != "/wrench"]
+    run.tf(run.true, parent="odom", child="base_link")
+    for at in range(0, 20, 1):
+        ahead = int(nav.unix(at + ahead_s))
+        run.log.add("/tf", nav.tf(nav.transform(ahead, "map", "odom", 5.0, 0.0)), int(nav.unix(at)))
+    recording = load(run, forces=Forces.IGNORED)
+    assert recording.notes == ("run.mcap: no odometry: poses are those of 'base_link' in tf",)
+    x, y, yaw = run.true((recording.t_ns - nav.START_NS) / 1e9)
+    assert recording.xy_m == pytest.approx(np.column_stack([x + 5.0, y]), abs=0.02)
+    assert recording.t_ns[-1] - recording.t_ns[0] > 18e9
 
 
 def test_tf_that_does_not_move_is_no_source(load):

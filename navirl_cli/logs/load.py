@@ -31,7 +31,7 @@ from navirl_cli.logs.roles.session import session_of
 from navirl_cli.logs.roles.space import Placed, in_one_frame
 from navirl_cli.logs.roles.tables import read_tables
 from navirl_cli.logs.roles.times import Tables, Timed, on_one_clock
-from navirl_cli.logs.roles.topics import Choice, choose, is_missing, refusal, topics_of
+from navirl_cli.logs.roles.topics import Choice, choose, is_missing, refusal, shared_topics, topics_of
 from navirl_cli.logs.sources import Source
 
 
@@ -55,6 +55,8 @@ class LoadOptions(ByContent):
     frame: str | None = None
     #: The frame that the wrench is given in, in place of its header's.
     wrench_frame: str | None = None
+    #: N for the unit of the wrench's forces, 1000 where they are in kN.
+    force_scale: float = 1.0
     #: A map in place of the log's, in the fixed frame.
     occupancy: Occupancy | None = None
     forces: Forces = Forces.NEEDED
@@ -138,11 +140,17 @@ def follow(
     timed = placed = None
     try:
         timed = on_one_clock(log, read.tables, options.time)
-        placed = in_one_frame(log, timed.tables, options.frame, options.wrench_frame, options.occupancy)
+        placed = in_one_frame(
+            log, timed.tables, options.frame, options.wrench_frame, options.occupancy, options.force_scale
+        )
         refusals += placed.refusals
     except NavirlError as error:
         refusals.append(error)
-    findings = (*(timed.findings if timed else ()), *(placed.findings if placed else ()))
+    findings = (
+        *shared_topics(topics, chosen),
+        *(timed.findings if timed else ()),
+        *(placed.findings if placed else ()),
+    )
     lost = (*map(str, (*source.damage, *read.damage)), *texts(log, findings, Severity.LOSS))
     if lost and options.strict:
         refusals.append(LogError(f"{log}: damaged, which `strict` refuses: {'; '.join(lost)}"))
