@@ -3,6 +3,7 @@
 import nav_log as nav
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.load import LoadOptions, load_recording
@@ -31,8 +32,6 @@ def load(tmp_path):
 
 
 def inverse(turn):
-    from scipy.spatial.transform import Rotation
-
     return Rotation.from_quat(turn).as_matrix().T
 
 
@@ -82,5 +81,5 @@ def test_no_force_at_all(tmp_path):
     log = nav.drive(3.0, skip=["/wrench"])
     for second in np.arange(0.0, 3.0, 0.02).tolist():
         log.add("/ft", nav.wrench(int(nav.unix(second)), NAN, NAN, NAN), int(nav.unix(second)))
-    with pytest.raises(LogError, match="^run.mcap: topic /ft: expected forces, found none that are finite$"):
+    with pytest.raises(LogError, match=r"^run.mcap: topic /ft: expected forces, found none that are finite$"):
         load_recording(log.write(tmp_path / "run.mcap"))

@@ -94,7 +94,12 @@ class Overview:
     @property
     def refusals(self) -> tuple[str, ...]:
         """Why extract refuses the log although each needed role has a topic, in words."""
-        return () if self.needed else tuple(dict.fromkeys(map(str, self.line.refusals)))
+        if self._missing:
+            return ()
+        reasons = [str(one) for one in self.line.refusals]
+        if self.line.recording is not None and self.line.recording.no_goal:
+            reasons.append(self.line.recording.goal_problem)
+        return tuple(dict.fromkeys(reasons))
 
     @property
     def reference_s(self) -> float:
@@ -105,7 +110,13 @@ class Overview:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """The roles that extract needs and the log does not serve."""
+        """The roles that extract needs and the log does not serve; goals too, at which it splits trials by default."""
+        no_goal = self.line.recording is not None and bool(self.line.recording.goal_problem)
+        return (*self._missing, "goal") if no_goal else self._missing
+
+    @property
+    def _missing(self) -> tuple[str, ...]:
+        """The needed roles without a topic."""
         return tuple(role for role, choice in self.choices.items() if is_missing(choice, self.choices))
 
 

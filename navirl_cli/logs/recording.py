@@ -128,6 +128,8 @@ class Recording:
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
+    #: Why there is no goal where there is none, as far as it is known: "1 messages on /goal_pose left out: ...".
+    no_goal: str = ""
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
     #: What is unusual about the log, in words.
@@ -143,3 +145,13 @@ class Recording:
             raise LogError(
                 f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
             )
+
+    @property
+    def goal_problem(self) -> str:
+        """Why trials cannot be split at goals, and what to do; empty where there are goals."""
+        if len(self.goal_t_ns):
+            return ""
+        remedy = "give one with `goal` x,y, or choose `split` stop or `split` none"
+        if self.no_goal:
+            return f"{self.log}: trials cannot be split at goals, because no goal is left: {self.no_goal}; or {remedy}"
+        return f"{self.log}: no goal is announced, so that trials cannot be split at goals; {remedy}"

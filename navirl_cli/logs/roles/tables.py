@@ -70,6 +70,9 @@ def _columns(choice: Choice, result: ReadResult) -> list[Columns]:
 def _unread(log: str, choice: Choice, result: ReadResult) -> LogError:
     """Why no message of a role could be read."""
     names = ", ".join(topic.name for topic in choice.topics)
-    reasons = [str(one) for one in result.damage if any(topic.name in one.reason for topic in choice.topics)]
-    why = f": {'; '.join(reasons)}" if reasons else ""
+    prefixes = [f"topic {topic.name}: " for topic in choice.topics]
+    reasons = [one.reason for one in result.damage if any(topic.name in one.reason for topic in choice.topics)]
+    for prefix in prefixes:
+        reasons = [reason.removeprefix(prefix) for reason in reasons]
+    why = f": {'; '.join(dict.fromkeys(reasons))}" if reasons else ""
     return LogError(f"{log}: no message on the {choice.role.name} topic {names} could be read{why}")

@@ -9,9 +9,12 @@ from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.messages.reader import Contents
 from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
 
+#: Before the list of a log's topics in a message.
+HOLDS: Final = "; the log holds "
 #: Most message types of a role that a message lists.
 _MOST_TYPES: Final = 7
 
@@ -269,6 +272,17 @@ def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     return f"no {role.name}: expected a topic of type {types}{notes}" + (f"; {role.remedy}" if role.remedy else "")
 
 
+def undefined(log: str, topics: Sequence[Topic]) -> LogError | None:
+    """The error that nothing in a log can be decoded, because no topic has a definition."""
+    channels = [channel for topic in topics if topic.count for channel in topic.channels]
+    if not channels or not all(map(lacks_definition, channels)):
+        return None
+    return LogError(
+        f"{log}: none of its {len(topics)} topics has a definition of its messages, so that nothing can be decoded; "
+        "convert it on a computer that has the message packages, for example with ros2 bag convert"
+    )
+
+
 def refusal(log: str, topics: Sequence[Topic], choice: Choice) -> LogError:
     """The error that a log lacks a needed topic."""
     if not topics:
@@ -279,4 +293,4 @@ def refusal(log: str, topics: Sequence[Topic], choice: Choice) -> LogError:
     listed = ", ".join(names[:MOST_NAMES])
     if len(names) > MOST_NAMES:
         listed += f" and {len(names) - MOST_NAMES} more"
-    return LogError(f"{log}: {choice.problem}; the log holds {listed}")
+    return LogError(f"{log}: {choice.problem}{HOLDS}{listed}")
