@@ -44,12 +44,12 @@ def test_a_person_whom_the_log_has_elsewhere(notes):
 
 def test_more_people_than_the_log_has(notes):
     count, place = notes((2.0, 0.9), (3.0, -1.0))
-    assert count == "`person` places 2 people, the log 1; those of the log are ignored"
+    assert count == "people by `person`: 2; in the log: 1; those of the log are ignored"
     assert place.startswith("`person` 3.00,-1.00 contradicts the log")
 
 
 def test_people_where_the_log_shows_nobody(notes):
-    assert notes((2.0, 0.9), people=()) == ("`person` places 1 people, the log 0; those of the log are ignored",)
+    assert notes((2.0, 0.9), people=()) == ("people by `person`: 1; in the log: 0; those of the log are ignored",)
 
 
 def test_a_person_on_the_path(notes):

@@ -9,6 +9,7 @@ from small_logs import messages
 
 from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.messages.reader import read
+from navirl_cli.logs.sources import sources_of
 
 FIELDS = {"/wrench": ("header.stamp", "wrench.force.x", "wrench.force.y"), "/odom": ("pose.pose.position.x",)}
 
@@ -42,6 +43,20 @@ def test_a_whole_recording(tmp_path):
     assert found.xy_m.tolist() == expected.xy_m.tolist()
     assert found.wrench.force_n.tolist() == expected.wrench.force_n.tolist()
     assert found.damage == found.notes == ()
+
+
+def test_a_bag_whose_metadata_names_the_mode(tmp_path):
+    log = nav.drive(5.0)
+    log.messages = [packed(one) for one in log.messages]
+    (folder := tmp_path / "walk").mkdir()
+    log.write(folder / "walk_0.mcap")
+    text = "rosbag2_bagfile_information:\n  storage_identifier: mcap\n  relative_file_paths: [walk_0.mcap]\n"
+    text += "  compression_format: zstd\n  compression_mode: MESSAGE\n"
+    (folder / "metadata.yaml").write_text(text, encoding="utf-8")
+    (source,) = sources_of([folder])
+    recording = load_recording(source)
+    assert len(recording.t_ns) == 100
+    assert recording.damage == recording.notes == ()
 
 
 def test_messages_as_json(tmp_path):

@@ -181,7 +181,7 @@ def placed_notes(given: FloatArray, logged: FloatArray | None, xy_m: FloatArray,
     if logged is None:
         return notes
     if len(given) != len(logged):
-        notes.append(f"`person` places {len(given)} people, the log {len(logged)}; those of the log are ignored")
+        notes.append(f"people by `person`: {len(given)}; in the log: {len(logged)}; those of the log are ignored")
     for person in given if len(logged) else ():
         away_m = np.hypot(*(logged - person).T)
         x, y = logged[int(away_m.argmin())]

@@ -102,6 +102,10 @@ class Session(ByContent):
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
+#: Fewer forces have no bias that could be told from a push.
+LEAST_FORCES = 50
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Everything of one log, on one clock and in one fixed frame."""
@@ -144,6 +148,18 @@ class Recording:
         if self.xy_m.shape != (len(self.t_ns), 2) or self.yaw_rad.shape != self.t_ns.shape:
             raise LogError(
                 f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
+            )
+        if self.wrench is not None:
+            self._check_wrench(self.wrench.t_ns)
+
+    def _check_wrench(self, t_ns: IntArray) -> None:
+        """Check that there are enough forces to find a bias, and that they were measured while the robot drove."""
+        if len(t_ns) < LEAST_FORCES:
+            raise LogError(f"{self.log}: expected a wrench of at least {LEAST_FORCES} messages, found {len(t_ns)}")
+        if t_ns[0] > self.t_ns[-1] or t_ns[-1] < self.t_ns[0]:
+            raise LogError(
+                f"{self.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
+                f"{(int(t_ns[0]) - int(self.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
             )
 
     @property
