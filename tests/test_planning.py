@@ -201,3 +201,23 @@ def test_a_recommendation_says_what_the_paths_of_the_policy_do():
     nearer = Reward((-54.1, -0.87, -2.0, 1.68))
     drawn = recommended(problem, PAPER, [PAPER, nearer])
     assert recommended(problem, nearer).passing_m.value < drawn.passing_m.lower < found.passing_m.value
+
+
+@pytest.mark.parametrize("c0", [-54.1, -26.0])
+def test_on_large_maps_cells_that_only_much_longer_paths_reach_change_nothing(monkeypatch, c0):
+    rng = np.random.default_rng(3)
+    occupied = rng.random((110, 110)) < 0.03
+    occupied[50:53, 20:90] = True
+    grid = Grid(occupied, 0.1, (0.0, 0.0))
+    free = np.argwhere(~occupied)[:, ::-1]
+    start, goal = (tuple(grid.centres_of(free[row])) for row in (5, -9))
+    found = []
+    for large in (1_000_000, 100):
+        monkeypatch.setattr("navirl_cli.planning.problem.LARGE", large)
+        planner = Planner(problem_on(grid, start, goal, [(4.0, 4.0)], 0.1), Reward((c0, -0.87, -4.91, 1.68)))
+        scene = planner.problem.scene
+        (path,) = planner.plan(Mode.LIKELY)
+        found.append((scene.lattice.size, planner.policy.value[scene.start], path.log_probability, path.line_m))
+    assert found[1][0] < found[0][0]
+    assert found[1][1:3] == pytest.approx(found[0][1:3], abs=1e-9)
+    np.testing.assert_array_equal(found[1][3], found[0][3])

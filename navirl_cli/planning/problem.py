@@ -20,6 +20,10 @@ MAP_FRAME: Final = "map"
 NS_PER_S: Final = 1_000_000_000
 
 Point = tuple[float, float]
+#: On maps with more free cells than this only those are kept through which a path this much longer than the shortest one
+#: can lead, m. Longer paths have no probability: an additional metre divides it by e^33 under the published reward, and
+#: by more than e^4 wherever the partition function is not nearly infinite.
+LARGE, LONGER_M = 60_000, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +85,9 @@ def problem_on(
     lattice = Lattice.around(grid, start)
     if lattice.states_of(goal[None])[0] < 0:
         raise SceneError(_walled_in(grid, lattice, start_m, goal_m))
+    if lattice.size > LARGE:
+        lattice = Lattice.around(_within_reach(lattice, start, goal), start)
+        grid = lattice.grid
     scene = Scene.on(grid, start, goal, people, lattice)
     return Problem(scene, start_m, goal_m, scene.nominal_line_m(), robot_radius_m, start_yaw_rad)
 
@@ -172,6 +179,17 @@ def _check_apart(name: str, point_m: Point, people_m: FloatArray, robot_radius_m
             f"`{name}`: the person at x {x:.2f} m, y {y:.2f} m stands {away.min():.2f} m from it, within the robot's "
             f"radius of {robot_radius_m:g} m"
         )
+
+
+def _within_reach(lattice: Lattice, start: IntArray, goal: IntArray) -> Grid:
+    """The map without the cells that only paths much longer than the shortest one reach."""
+    first, last = lattice.states_of(np.stack([start, goal]))
+    to_goal = lattice.costs_to(int(last), lattice.step_m)
+    from_start = np.hypot(*(lattice.xy_m - lattice.xy_m[first]).T)  # no path is shorter
+    near = lattice.cells[from_start + to_goal <= to_goal[first] + LONGER_M]
+    occupied = np.ones(lattice.grid.shape, dtype=bool)
+    occupied[near[:, 1], near[:, 0]] = False
+    return Grid(occupied, lattice.grid.resolution_m, lattice.grid.origin_m)
 
 
 def _walled_in(grid: Grid, lattice: Lattice, start_m: Point, goal_m: Point) -> str:
