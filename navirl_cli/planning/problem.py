@@ -20,8 +20,8 @@ MAP_FRAME: Final = "map"
 NS_PER_S: Final = 1_000_000_000
 
 Point = tuple[float, float]
-#: On maps with more free cells than this only those are kept through which a path this much longer than the shortest one
-#: can lead, m. Longer paths have no probability: an additional metre divides it by e^33 under the published reward, and
+#: On maps with more free cells than this only those are kept through which a path at most this much longer than the shortest
+#: one leads, m. Longer paths have no probability: an additional metre divides it by e^33 under the published reward, and
 #: by more than e^4 wherever the partition function is not nearly infinite.
 LARGE, LONGER_M = 60_000, 4.0
 
