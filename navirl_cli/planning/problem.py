@@ -20,9 +20,9 @@ MAP_FRAME: Final = "map"
 NS_PER_S: Final = 1_000_000_000
 
 Point = tuple[float, float]
-#: On maps with more free cells than this only those are kept through which a path at most this much longer than the shortest
-#: one leads, m. Longer paths have no probability: an additional metre divides it by e^33 under the published reward, and
-#: by more than e^4 wherever the partition function is not nearly infinite.
+#: On maps with more free cells than this only those are kept that lie on paths at most this much longer than the
+#: shortest one, m. Longer paths have no probability: an additional metre divides it by e^33 under the published reward,
+#: and by more than e^4 wherever the partition function is not nearly infinite.
 LARGE, LONGER_M = 60_000, 4.0
 
 
