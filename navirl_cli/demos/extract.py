@@ -10,6 +10,7 @@ import numpy as np
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.demos.checks import (
     check_cells,
+    check_end,
     check_gaps,
     check_goal,
     check_start,
@@ -17,6 +18,7 @@ from navirl_cli.demos.checks import (
     jump_notes,
     path_notes,
     people_notes,
+    placed_notes,
     recording_notes,
 )
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
@@ -26,7 +28,7 @@ from navirl_cli.demos.grid import Grid, grid_from_occupancy
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, trials_of
-from navirl_cli.errors import DemonstrationError, NavirlError
+from navirl_cli.errors import MOST_NAMES, DemonstrationError, NavirlError, joined
 from navirl_cli.logs.recording import Declared, Published, Recording
 
 Entry = TypeVar("Entry", Declared, Published)
@@ -112,8 +114,12 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         except NavirlError as error:
             skipped.append((number, str(error)))
     if not found:
-        reasons = "; ".join(_grouped(skipped)) or "no goal is announced while poses are recorded"
-        raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
+        reasons = _grouped(skipped) or ["no goal is announced while poses are recorded"]
+        prefix = f"{recording.log}: "
+        # what was lost on the way may be the cause
+        raise DemonstrationError(
+            f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
+        )
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
@@ -162,9 +168,14 @@ def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
     for number, reason in skipped:
         by_reason.setdefault(reason, []).append(str(number))
     return [
-        f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: {reason}"
-        for reason, numbers in by_reason.items()
+        f"trial{'s' if len(numbers) > 1 else ''} {_numbers(numbers)}: {reason}" for reason, numbers in by_reason.items()
     ]
+
+
+def _numbers(numbers: Sequence[str]) -> str:
+    """Numbers of trials, of many the first ones."""
+    more = f" and {len(numbers) - MOST_NAMES} others" if len(numbers) > MOST_NAMES else ""
+    return ", ".join(numbers[:MOST_NAMES]) + more
 
 
 def _demonstration(
@@ -177,8 +188,8 @@ def _demonstration(
     check_travel(xy)
     check_gaps(recording, trial, pushes)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
-    people = _people(recording, settings, start_ns, stop_ns)
     radius_m = _radius_m(recording, settings)
+    people = _people(recording, settings, trial, radius_m)
     check_start(people.people_m, xy[0], radius_m)
     cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
@@ -221,11 +232,16 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
     return cells, free
 
 
-def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> People:
-    """The people of a trial: those placed by the user, else those of the log."""
-    if settings.people_m is not None:
-        return People(np.array(settings.people_m))
-    return people_during(recording, start_ns, stop_ns)
+def _people(recording: Recording, settings: ExtractSettings, trial: Trial, radius_m: float) -> People:
+    """The people of a trial: those placed by the user, with what contradicts them, else those of the log."""
+    xy = recording.xy_m[trial.first : trial.stop]
+    logged = people_during(recording, int(recording.t_ns[trial.first]), int(recording.t_ns[trial.stop - 1]))
+    if settings.people_m is None:
+        return logged
+    given = np.array(settings.people_m)
+    check_end(given, xy[-1], radius_m)
+    known = logged.people_m if len(recording.people_t_ns) else None
+    return People(given, notes=tuple(placed_notes(given, known, xy, radius_m)))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:
