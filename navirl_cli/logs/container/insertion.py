@@ -1,0 +1,168 @@
+"""A copy of an MCAP file with one metadata record more; all bytes of the data section stay as they are.
+
+Source: the MCAP file format specification, https://mcap.dev/spec.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import BinaryIO, Final
+
+from navirl_cli.logs.container import records
+from navirl_cli.logs.container.raw import BLOCK, RawFile
+from navirl_cli.logs.container.records import RECORD_HEAD, Footer
+from navirl_cli.logs.container.summary import read_footer, read_header, read_summary
+
+_DATA_END: Final = struct.Struct("<BQI")
+_FOOTER: Final = struct.Struct("<QQI")
+#: Where the number of metadata records stands in a statistics record.
+_COUNT_AT: Final = records.HEAD_SIZE + 18
+
+
+def write_with_metadata(raw: RawFile, target: BinaryIO, name: str, values: dict[str, str], after: int | None) -> None:
+    """Write a file's bytes and a metadata record, which stands last in the data section.
+
+    Statistics, indexes and CRCs are corrected. A CRC that is wrong stays wrong and a damaged summary damaged, so that
+    the copy reports the same damage. In a file without its end nothing points to bytes by number. There the record
+    stands after the header, or after an earlier record of the same name.
+
+    Args:
+        raw: The file, decompressed if it was compressed.
+        target: Where to write.
+        name: Of the record.
+        values: Its texts by key.
+        after: In a file without its end: first byte after the last record of the same name; None where there is none.
+    """
+    record = _metadata(name, values)
+    data_start = read_header(raw)[2]
+    footer = read_footer(raw)
+    if footer is None or not data_start <= (footer.summary_start or raw.size) <= raw.size - records.TAIL_SIZE:
+        place = max(data_start, after or 0)
+        _copy(raw, target, 0, place)
+        target.write(record)
+        _copy(raw, target, place, raw.size)
+        return
+    place, stop = _data_end(raw, footer)
+    crc = _copy(raw, target, 0, place)
+    target.write(record)
+    target.write(_with_crc(raw.read(place, stop), crc, record))
+    for part in _ending(raw, footer, data_start, (place, name, record)):
+        target.write(part)
+
+
+def _metadata(name: str, values: dict[str, str]) -> bytes:
+    """A metadata record."""
+    entries = b"".join(_string(key) + _string(value) for key, value in values.items())
+    return _record(records.METADATA, _string(name) + struct.pack("<I", len(entries)) + entries)
+
+
+def _string(text: str) -> bytes:
+    data = text.encode()
+    return struct.pack("<I", len(data)) + data
+
+
+def _record(code: int, content: bytes) -> bytes:
+    return RECORD_HEAD.pack(code, len(content)) + content
+
+
+def _copy(raw: RawFile, target: BinaryIO, start: int, stop: int) -> int:
+    """Copy bytes [start, stop), and return their CRC."""
+    crc = 0
+    for at in range(start, stop, BLOCK):
+        block = raw.read(at, min(stop, at + BLOCK))
+        crc = zlib.crc32(block, crc)
+        target.write(block)
+    return crc
+
+
+def _data_end(raw: RawFile, footer: Footer) -> tuple[int, int]:
+    """First byte of the record that ends the data section and first byte after it; the same where it is missing."""
+    stop = footer.summary_start or raw.size - records.TAIL_SIZE
+    start = stop - _DATA_END.size
+    code, length = RECORD_HEAD.unpack(raw.read(start, start + records.HEAD_SIZE))
+    return (start, stop) if (code, length) == (records.DATA_END, 4) else (stop, stop)
+
+
+def _with_crc(data_end: bytes, crc: int, record: bytes) -> bytes:
+    """The data end record with the CRC of the longer section, where it had a right one."""
+    if not data_end:
+        return data_end
+    code, length, written = _DATA_END.unpack(data_end)
+    return _DATA_END.pack(code, length, zlib.crc32(record, crc)) if written and written == crc else data_end
+
+
+def _ending(raw: RawFile, footer: Footer, data_start: int, added: tuple[int, str, bytes]) -> Iterator[bytes]:
+    """Summary section, footer and magic, corrected for a record (place, name, bytes) that was added."""
+    place, name, record = added
+    tail = raw.size - records.TAIL_SIZE
+    start = footer.summary_start
+    content = raw.read(tail + records.HEAD_SIZE, tail + records.HEAD_SIZE + _FOOTER.size)
+    _, offsets_start, crc = _FOOTER.unpack(content)
+    summary = raw.read(start, tail) if start else b""
+    if start and read_summary(raw, data_start, footer) is not None:
+        index = _record(records.METADATA_INDEX, struct.pack("<QQ", place, len(record)) + _string(name))
+        new = _Section.of(summary).with_index(index)
+        summary = new.written(start + len(record), with_offsets=offsets_start != 0)
+        offsets_start = start + len(record) + new.size if offsets_start else 0
+        start += len(record)
+        head = RECORD_HEAD.pack(records.FOOTER, _FOOTER.size) + struct.pack("<QQ", start, offsets_start)
+        crc = zlib.crc32(head, zlib.crc32(summary)) if crc else 0
+    elif start:  # damaged: its bytes stay
+        start, offsets_start = start + len(record), offsets_start + len(record) if offsets_start else 0
+    yield summary
+    yield _record(records.FOOTER, _FOOTER.pack(start, offsets_start, crc))
+    yield records.MAGIC
+
+
+@dataclass(frozen=True)
+class _Section:
+    """The records of an intact summary section without their summary offsets, in order."""
+
+    records: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, summary: bytes) -> "_Section":
+        """Cut the section into its records."""
+        found = []
+        at = 0
+        while at < len(summary):
+            code, length = RECORD_HEAD.unpack_from(summary, at)
+            stop = at + records.HEAD_SIZE + length
+            if code != records.SUMMARY_OFFSET:
+                found.append(summary[at:stop])
+            at = stop
+        return cls(tuple(found))
+
+    @property
+    def size(self) -> int:
+        """Bytes of the records."""
+        return sum(map(len, self.records))
+
+    def with_index(self, index: bytes) -> "_Section":
+        """The section with a metadata index after the others, and one metadata record more in the statistics."""
+        own = [number for number, one in enumerate(self.records) if one[0] == records.METADATA_INDEX]
+        place = own[-1] + 1 if own else len(self.records)
+        several = [*self.records[:place], index, *self.records[place:]]
+        return _Section(tuple(_counted(one) if one[0] == records.STATISTICS else one for one in several))
+
+    def written(self, start: int, *, with_offsets: bool) -> bytes:
+        """The section from a byte of the file on, with the offsets of its groups."""
+        groups: dict[int, tuple[int, int]] = {}
+        at = start
+        for one in self.records:
+            first, size = groups.get(one[0], (at, 0))
+            # a group ends where a record of another type follows
+            groups[one[0]] = (first, size + len(one)) if first + size == at else (first, size)
+            at += len(one)
+        offsets = [
+            _record(records.SUMMARY_OFFSET, struct.pack("<BQQ", code, first, size))
+            for code, (first, size) in groups.items()
+        ]
+        return b"".join([*self.records, *(offsets if with_offsets else [])])
+
+
+def _counted(statistics: bytes) -> bytes:
+    """A statistics record with one metadata record more."""
+    (count,) = struct.unpack_from("<I", statistics, _COUNT_AT)
+    return statistics[:_COUNT_AT] + struct.pack("<I", count + 1) + statistics[_COUNT_AT + 4 :]
