@@ -5,9 +5,13 @@ Source: the MCAP file format specification, https://mcap.dev/spec.
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO, Final
+
+import zstandard
 
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.raw import BLOCK, RawFile
@@ -20,25 +24,41 @@ _FOOTER: Final = struct.Struct("<QQI")
 _COUNT_AT: Final = records.HEAD_SIZE + 18
 
 
-def write_with_metadata(raw: RawFile, target: BinaryIO, name: str, values: dict[str, str], after: int | None) -> None:
+@contextmanager
+def writing(path: Path, compression: str) -> Iterator[BinaryIO]:
+    """A stream into a file, compressed by "zstd", "lz4" or not at all ("")."""
+    with ExitStack() as stack:
+        stream: BinaryIO = stack.enter_context(path.open("wb"))
+        if compression == "zstd":
+            stream = stack.enter_context(zstandard.ZstdCompressor().stream_writer(stream))
+        elif compression == "lz4":
+            import lz4.frame
+
+            stream = stack.enter_context(lz4.frame.open(stream, "wb"))
+        yield stream
+
+
+def write_with_metadata(raw: RawFile, target: BinaryIO, name: str, values: Mapping[str, str]) -> None:
     """Write a file's bytes and a metadata record, which stands last in the data section.
 
     Statistics, indexes and CRCs are corrected. A CRC that is wrong stays wrong and a damaged summary damaged, so that
     the copy reports the same damage. In a file without its end nothing points to bytes by number. There the record
-    stands after the header, or after an earlier record of the same name.
+    stands after the header and metadata records that follow it.
 
     Args:
         raw: The file, decompressed if it was compressed.
         target: Where to write.
         name: Of the record.
         values: Its texts by key.
-        after: In a file without its end: first byte after the last record of the same name; None where there is none.
+
+    Raises:
+        LogError: The file has no header.
     """
     record = _metadata(name, values)
     data_start = read_header(raw)[2]
-    footer = read_footer(raw)
-    if footer is None or not data_start <= (footer.summary_start or raw.size) <= raw.size - records.TAIL_SIZE:
-        place = max(data_start, after or 0)
+    footer, tail = read_footer(raw), raw.size - records.TAIL_SIZE
+    if footer is None or not data_start <= (footer.summary_start or tail) <= tail:
+        place = _after_metadata(raw, data_start)
         _copy(raw, target, 0, place)
         target.write(record)
         _copy(raw, target, place, raw.size)
@@ -51,7 +71,19 @@ def write_with_metadata(raw: RawFile, target: BinaryIO, name: str, values: dict[
         target.write(part)
 
 
-def _metadata(name: str, values: dict[str, str]) -> bytes:
+def _after_metadata(raw: RawFile, at: int) -> int:
+    """First byte after the metadata records that start at a byte."""
+    while True:
+        head = raw.read(at, at + records.HEAD_SIZE)
+        if len(head) < records.HEAD_SIZE:
+            return at
+        code, length = RECORD_HEAD.unpack(head)
+        if code != records.METADATA or at + records.HEAD_SIZE + length > raw.size:
+            return at
+        at += records.HEAD_SIZE + length
+
+
+def _metadata(name: str, values: Mapping[str, str]) -> bytes:
     """A metadata record."""
     entries = b"".join(_string(key) + _string(value) for key, value in values.items())
     return _record(records.METADATA, _string(name) + struct.pack("<I", len(entries)) + entries)
