@@ -52,11 +52,12 @@ def annotate(
     as_json: bool,
     force: bool,
 ) -> None:
-    """Write the labels of trials into a copy of a log, so that the recording keeps them.
+    """Write the labels of trials into a copy of a log.
 
-    TRIALS is a table as navirl inspect --trials writes it, filled in. LOG is an MCAP file or a rosbag2 folder. The copy
-    holds all that the log holds, byte by byte, and a metadata record navirl.session with the labels. An existing
-    record stays in the file, and the new one, which also holds what the table leaves empty, counts in its place.
+    The copy keeps the labels, so that navirl extract needs no table for it. TRIALS is a table as navirl inspect
+    --trials writes it, filled in. LOG is an MCAP file or a rosbag2 folder. The copy holds all that the log holds, byte
+    by byte, and a metadata record navirl.session with the labels. An existing record stays in the file, and the new
+    one, which also holds what the table leaves empty, counts in its place.
 
     The copy of a file is compressed if its name ends in .zst or .lz4. Of a folder, all files are copied.
     """

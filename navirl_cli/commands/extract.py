@@ -48,7 +48,6 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
         Example("A trial for each goal that the logs announce", "navirl extract p01.mcap p02.mcap -o demos.json"),
         Example("All logs of a folder, with a named topic", "navirl extract logs --topic wrench=/wrench -o demos.json"),
         Example("Labels of each trial from a table", "navirl extract p01.mcap --trials trials.csv -o demos.json"),
-        Example("Larger cells, and the robot's gain", "navirl extract p01.mcap --resolution 0.2 --gain -o demos.json"),
     ],
 )
 @logs_argument

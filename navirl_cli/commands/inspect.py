@@ -21,7 +21,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.labels import log_names
-from navirl_cli.demos.listing import FoundTrial, TrialSettings, list_trials
+from navirl_cli.demos.listing import Listing, TrialSettings, list_trials
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.tables import Format, written
 from navirl_cli.documents.text import to_text
@@ -39,7 +39,6 @@ from navirl_cli.reports.trials import trials_table
         Example("Topics of a log, and the topics that extract would use", "navirl inspect p01.mcap"),
         Example("All logs of a folder, with a check of every message", "navirl inspect logs --check"),
         Example("A table of the trials, to be filled in", "navirl inspect p01.mcap p02.mcap --trials"),
-        Example("For a program", "navirl inspect p01.mcap --topic wrench=/wrench --json"),
     ],
 )
 @logs_argument
@@ -132,24 +131,20 @@ def _list(
     sources: list[Source], settings: TrialSettings, options: LoadOptions, refused: list[NavirlError], *, as_json: bool
 ) -> None:
     """Print the trials of recordings as a table."""
-    found: list[FoundTrial] = []
-    notes: list[str] = []
+    found: list[Listing] = []
     with bytes_bar("inspect") as update:
         for source, name in zip(sources, log_names(sources), strict=True):
             try:
-                own, about = list_trials(source, name, settings, options, update)
+                found.append(list_trials(source, name, settings, options, update))
             except NavirlError as error:
                 refused.append(error)
-                continue
-            found += own
-            notes += about
     if refused and not found:
         raise refused[0]
-    table = trials_table(found)
+    table = trials_table(trial for one in found for trial in one.trials)
     if as_json:
         echo_json({"trials": table.records()})
     else:
         click.echo(written(table, Format.CSV))
-    for note in merged(notes):
+    for note in merged(note for one in found for note in one.notes):
         say(note)
-    finish([f"left out: {error}" for error in refused])
+    finish([*(f"left out: {error}" for error in refused), *(line for one in found for line in one.damage)])

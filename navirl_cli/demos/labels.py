@@ -61,7 +61,7 @@ class Labels(ByContent):
 
 
 def read_labels(path: Path) -> Labels:
-    """Read a table as ``navirl inspect --trials`` writes it, filled in by hand or in a spreadsheet.
+    """Read a table of trials, filled in by hand or in a spreadsheet.
 
     Args:
         path: A CSV file in UTF-8, separated by commas, semicolons or tabs. Only the column start_s is needed. In a
@@ -129,8 +129,9 @@ def _label(cells: _Cells) -> Label:
     if start_s is None:
         cells.refuse("start_s", "the trial's start in s, as inspect writes it")
     condition = cells.text("condition")
-    if condition is not None and condition.lower() not in set(Condition):
-        raise LabelError(f"{cells.line.where}, {unknown('column condition', condition, Condition)}; correct it")
+    conditions = [one.value for one in Condition]
+    if condition is not None and condition.lower() not in conditions:
+        raise LabelError(f"{cells.line.where}, {unknown('column condition', condition, conditions)}; correct it")
     cycle = cells.number("cycle", "a whole number from 1 on", 1, MOST_CYCLES)
     if cycle is not None and cycle != int(cycle):
         cells.refuse("cycle", "a whole number from 1 on")
@@ -200,7 +201,7 @@ def labels_by_source(labels: Labels, sources: Sequence[Source]) -> tuple[list[tu
     if not any(rows):
         names = ", ".join(log_names(sources)[:_NEAR])
         raise LabelError(f"{labels.path}: expected rows of {names}, found rows of {listed}; correct the column log")
-    notes = [f"{labels.path.name}: {sum(others.values())} rows are of logs that were not read: {listed}"]
+    notes = [f"{labels.path.name}: rows of logs that were not read: {sum(others.values())} ({listed})"]
     return [tuple(own) for own in rows], notes if others else []
 
 

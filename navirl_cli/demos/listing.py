@@ -45,6 +45,16 @@ class FoundTrial:
     robot_radius_m: float | None
 
 
+@dataclass(frozen=True)
+class Listing:
+    """The trials of one recording."""
+
+    trials: tuple[FoundTrial, ...]
+    #: What is unusual, and what is lost, in words.
+    notes: tuple[str, ...]
+    damage: tuple[str, ...]
+
+
 def recording_of(source: Source, options: LoadOptions, progress: Progress | None = None) -> Recording:
     """A recording in which trials are found: its map may be missing, because trials do not depend on it.
 
@@ -69,7 +79,7 @@ def trials_in(recording: Recording, settings: TrialSettings) -> tuple[Recording,
 
 def list_trials(
     source: Source, name: str, settings: TrialSettings, options: LoadOptions, progress: Progress | None = None
-) -> tuple[list[FoundTrial], list[str]]:
+) -> Listing:
     """The trials that an extraction would find in a recording.
 
     Args:
@@ -80,7 +90,7 @@ def list_trials(
         progress: Called with bytes done and bytes in all.
 
     Returns:
-        The trials in which the robot moves, and notes on the others.
+        The trials in which the robot moves, with notes on the others.
 
     Raises:
         LogError: The log cannot be read.
@@ -113,7 +123,7 @@ def list_trials(
                 robot_radius_m=recording.session.robot_radius_m,
             )
         )
-    return found, [*recording.notes, *_empty_notes(recording, empty)]
+    return Listing(tuple(found), (*recording.notes, *_empty_notes(recording, empty)), recording.damage)
 
 
 def _empty_notes(recording: Recording, numbers: Sequence[int]) -> list[str]:
