@@ -167,7 +167,7 @@ def log_names(sources: Sequence[Source]) -> list[str]:
 def _parts(source: Source) -> tuple[str, ...]:
     """The parts of a recording's path."""
     path = Path(os.path.abspath(source.files[0]))  # noqa: PTH100 - links keep their names, and .. goes
-    return (path if path.name == source.name or len(source.files) == 1 else path.parent).parts
+    return (path if path.name == source.name else path.parent).parts
 
 
 def labels_by_source(labels: Labels, sources: Sequence[Source]) -> tuple[list[tuple[Label, ...]], list[str]]:
