@@ -5,6 +5,7 @@ import struct
 import zlib
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 import pytest
 import small_logs
@@ -208,6 +209,16 @@ def test_an_earlier_record_is_merged_and_stays_in_the_file(tmp_path, robot_table
     assert demos(again) == demos(copy)
 
 
+def test_a_table_that_changes_nothing_changes_nothing(navirl, tmp_path):
+    """A table as inspect writes it, of a log that states everything."""
+    log = Path(__file__).parent.parent / "sample_logs" / "p01.mcap"
+    (tmp_path / "trials.csv").write_text(navirl("inspect", log, "--trials").stdout)
+    done = navirl("annotate", log, "trials.csv", "-o", "copy.mcap")
+    assert "counts in its place (kept: participant, trials)" in done.stderr
+    records = scan(tmp_path / "copy.mcap").metadata["navirl.session"]
+    assert records[0] == records[1]
+
+
 def test_a_record_inside_a_log_without_its_end_is_refused(tmp_path, robot_table):
     """The new record would stand before the old one, which readers would take."""
     log = tmp_path / "log.mcap"
@@ -281,6 +292,14 @@ def test_nothing_is_left_where_writing_fails(tmp_path, variants, table, monkeypa
         with pytest.raises(ArtefactError, match=r"copy.*: cannot be written: No space left on device"):
             annotated(one, table, output)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_empty_table_is_not_written(navirl, tmp_path):
+    log = write_run(tmp_path / "log.mcap")
+    (tmp_path / "trials.csv").write_text(navirl("inspect", log, "--trials").stdout)
+    error = navirl("annotate", log, "trials.csv", "-o", "copy.mcap", code=1).stderr
+    assert "trials.csv: expected labels in the rows of log.mcap, found empty cells; fill them in" in error
+    assert not (tmp_path / "copy.mcap").exists()
 
 
 def test_refusals_leave_no_copy(navirl, tmp_path, variants):

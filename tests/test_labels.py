@@ -310,6 +310,18 @@ def test_the_table_leaves_out_what_extract_leaves_out(navirl, tmp_path):
     assert "run.mcap: trial 1 left out, because the robot hardly moves; extract leaves it out too" in done.stderr
 
 
+def test_a_log_whose_goal_comes_after_its_last_pose_has_no_trials(navirl, tmp_path):
+    late = write_run(tmp_path / "late.mcap", Run(goals=((20.0, 4.0, 0.0),)))
+    good = write_run(tmp_path / "run.mcap", TWO)
+    error = navirl("inspect", late, "--trials", code=1).stderr
+    assert "late.mcap: no trial: no goal is announced while poses are recorded" in error
+    done = navirl("inspect", late, good, "--trials", code=3)
+    assert len(done.stdout.splitlines()) == 3
+    assert "left out: late.mcap: no trial" in done.stderr
+    done = navirl("extract", late, good, "-o", "a.json", code=3)
+    assert "late.mcap: no trial became a demonstration: no goal is announced while poses are recorded" in done.stderr
+
+
 @pytest.mark.parametrize(
     "words", [("--check", "--trials"), ("--split", "stop"), ("--goal", "1,2"), ("--frame", "odom")]
 )

@@ -153,6 +153,16 @@ def test_a_robot_is_neither_huge_nor_that_fast(tmp_path, key, value):
         told(tmp_path, {key: value})
 
 
+def test_halves_of_characters_are_replaced(tmp_path):
+    values = {
+        "trials": r'[{"t_ns": 1, "set": "a\ud800b", "participant": "\ud83d\ude00"}]',
+        "completion_s": r'{"\udc00": [1]}',
+    }
+    session = told(tmp_path, values)
+    assert (session.declared[0].set, session.declared[0].participant) == ("a\ufffdb", "\U0001f600")
+    assert list(session.completion_s) == ["\ufffd"]
+
+
 def test_a_session_and_its_record_are_the_same(tmp_path):
     entries = [
         {"t_ns": 5, "stop_ns": 9, "participant": "ä", "cycle": 1, "condition": "force", "set": "s", "people_m": []},

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from navirl_cli.demos.labels import Labels, labelled, labels_by_source
 from navirl_cli.demos.listing import TrialSettings, recording_of, trials_in
-from navirl_cli.errors import ArtefactError, LogError, brief
+from navirl_cli.errors import ArtefactError, LabelError, LogError, brief
 from navirl_cli.files import replacing
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.insertion import write_with_metadata, writing
@@ -66,7 +66,13 @@ def annotate(
     source = _only_source(log)
     (rows,), notes = labels_by_source(labels, [source])
     recording, trials = trials_in(recording_of(source, replace(options, forces=Forces.IGNORED), progress), settings)
-    values = session_values(labelled(recording, trials, rows))
+    stating = sum(row.states for row in rows)
+    if not stating:
+        raise LabelError(
+            f"{labels.path}: expected labels in the rows of {source.name}, found empty cells; fill them in"
+        )
+    session = labelled(recording, trials, rows)
+    values = {} if session == recording.session else session_values(session)
     contents = [_scanned(path) for path in source.files]
     # readers take the last record of a name, in the last file that has one
     having = [number for number, one in enumerate(contents) if SESSION_RECORD in one.metadata]
@@ -81,7 +87,7 @@ def annotate(
         with replacing(output, force=force) as temporary:
             _write(source.files[0], temporary, output.suffix, merged)
     damage = tuple(str(one) for one in (*source.damage, *(one for content in contents for one in content.damage)))
-    return Annotated(output, len(trials), len(rows), (*notes, *_record_notes(source, before, merged)), damage)
+    return Annotated(output, len(trials), stating, (*notes, *_record_notes(source, before, merged)), damage)
 
 
 def _only_source(log: Path) -> Source:

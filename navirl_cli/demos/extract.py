@@ -292,7 +292,7 @@ def _stated(recording: Recording, trials: Sequence[Trial], settings: ExtractSett
 
 def _row_notes(recording: Recording, without: Sequence[int], found: Sequence[Demonstration]) -> list[str]:
     """The demonstrations without a row in the table of trials."""
-    numbers = [str(number) for one in found if (number := _number(one)) in without]
+    numbers = [str(number) for one in found if (number := _number(one)) in set(without)]
     if not numbers:
         return []
     which = f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"

@@ -51,6 +51,11 @@ class Label(ByContent):
     #: (k, 2) m, map frame: the line that the robot's navigation followed.
     nominal_m: FloatArray | None = None
 
+    @property
+    def states(self) -> bool:
+        """Whether any cell is filled in."""
+        return any(getattr(self, name) is not None for name in STATED)
+
 
 @dataclass(frozen=True, eq=False)
 class Labels(ByContent):
@@ -223,7 +228,7 @@ def labelled(recording: Recording, trials: Sequence[Trial], rows: Sequence[Label
     declared = [entry for entry in session.declared if id(entry) not in replaced]
     for number, row in by_trial.items():
         entry = known.get(number, Declared(int(recording.t_ns[trials[number].first])))
-        declared.append(replace(entry, **_stated(row)))
+        declared.append(replace(entry, **_stated(row, entry.participant or session.participant)))
     declared.sort(key=lambda entry: entry.t_ns)
     radius_m = session.robot_radius_m if (stated_m := _radius_m(rows)) is None else stated_m
     return replace(session, declared=tuple(declared), robot_radius_m=radius_m)
@@ -235,9 +240,11 @@ def without_row(recording: Recording, trials: Sequence[Trial], rows: Sequence[La
     return [number + 1 for number in range(len(trials)) if number not in by_trial] if rows else []
 
 
-def _stated(row: Label) -> dict[str, Any]:
-    """What a row states of its trial, by field of :class:`Declared`."""
+def _stated(row: Label, participant: str | None) -> dict[str, Any]:
+    """What a row states of its trial, by field of :class:`Declared`; a participant only where it is another one."""
     values = {name: getattr(row, name) for name in STATED if name != "robot_radius_m"}
+    if row.participant == participant:
+        del values["participant"]
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -308,7 +315,8 @@ def check_agreement(labels: Labels, given: Mapping[str, Any]) -> None:
 
 def points_text(points: ArrayLike) -> str:
     """(k, 2) points as a cell holds them."""
-    return "; ".join(f"{x:.15g},{y:.15g}" for x, y in np.asarray(points, dtype=float)) or NOBODY
+    several = np.asarray(points, dtype=float).tolist()
+    return "; ".join(",".join(repr(value).removesuffix(".0") for value in point) for point in several) or NOBODY
 
 
 def _shown(value: Any) -> str:

@@ -98,6 +98,8 @@ def list_trials(
     """
     forces = Forces.OPTIONAL if options.forces is Forces.NEEDED else options.forces
     recording, trials = trials_in(recording_of(source, replace(options, forces=forces), progress), settings)
+    if not trials:
+        raise DemonstrationError(f"{recording.log}: no trial: no goal is announced while poses are recorded")
     pushes = None if recording.wrench is None else pushes_of(recording, PushSettings())
     known = entries_by_trial(recording.session.declared, recording, trials)
     found, empty = [], []

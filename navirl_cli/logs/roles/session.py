@@ -124,7 +124,12 @@ def _text(entry: Mapping[str, Any], key: str) -> str | None:
     value = entry.get(key)
     if not (value is None or isinstance(value, str)):
         raise TypeError(f"{key} {value!r} must be a text")
-    return value
+    return None if value is None else _clean(value)
+
+
+def _clean(text: str) -> str:
+    """A text of JSON that can be written: halves of surrogate pairs are replaced."""
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
 
 
 def _points(entry: Mapping[str, Any], key: str, count: tuple[int, int]) -> FloatArray | None:
@@ -147,7 +152,7 @@ def _published(entry: Mapping[str, Any]) -> Published:
     t_ns, cells = entry["t_ns"], np.array(entry["cells"])
     if type(t_ns) is not int or cells.dtype.kind != "i" or cells.ndim != 2 or cells.shape[1] != 2:
         raise TypeError(f"t_ns {t_ns!r} must be a whole number, and cells pairs of whole numbers")
-    return Published(t_ns, str(entry["name"]), cells.astype(np.int64))
+    return Published(t_ns, _clean(str(entry["name"])), cells.astype(np.int64))
 
 
 def _up_to(most: float) -> Callable[[Any], float]:
@@ -163,4 +168,4 @@ def _up_to(most: float) -> Callable[[Any], float]:
 
 def _times(entries: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
     """Times by modality."""
-    return {modality: tuple(map(_up_to(_MOST_S), times)) for modality, times in entries.items()}
+    return {_clean(modality): tuple(map(_up_to(_MOST_S), times)) for modality, times in entries.items()}
