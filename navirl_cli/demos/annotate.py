@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from os import getpid
 from pathlib import Path
 
-from navirl_cli.demos.labels import Labels, labelled, labels_by_source
+from navirl_cli.demos.labelling import labelled
+from navirl_cli.demos.labels import Labels, labels_by_source
 from navirl_cli.demos.listing import TrialSettings, recording_of, trials_in
 from navirl_cli.errors import ArtefactError, LabelError, LogError, brief
 from navirl_cli.files import replacing

@@ -22,7 +22,8 @@ from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, push
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
 from navirl_cli.demos.grid import Grid, grid_from_occupancy
-from navirl_cli.demos.labels import Label, labelled, without_row
+from navirl_cli.demos.labelling import guess_notes, labelled, row_notes, stated_of
+from navirl_cli.demos.labels import Label
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, entries_by_trial, trials_of, with_goal
@@ -107,7 +108,7 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
     found: list[Demonstration] = []
     skipped: list[tuple[int, str]] = []
     for number, (trial, declared) in enumerate(zip(trials, stated, strict=True), start=1):
-        name = f"{declared.participant or _log_name(recording)}/{number}"
+        name = f"{declared.participant or recording.log.partition('.mcap')[0]}/{number}"
         try:
             found.append(_demonstration(recording, trial, pushes, grid, settings, name, declared))
         except NavirlError as error:
@@ -117,8 +118,8 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
-    notes += _row_notes(recording, without_row(recording, trials, labels), found)
-    notes += _guess_notes(recording, [stated[_number(one) - 1] for one in found])
+    own = {(number := _number(one)): stated[number - 1] for one in found}
+    notes += [*row_notes(recording, trials, labels, own), *guess_notes(recording, own.values())]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
@@ -262,11 +263,6 @@ def _number(one: Demonstration) -> int:
     return int(one.id.rpartition("/")[2])
 
 
-def _log_name(recording: Recording) -> str:
-    """The log's name in place of the participant's."""
-    return recording.log.partition(".mcap")[0]
-
-
 def _trials(
     recording: Recording, settings: ExtractSettings, labels: Sequence[Label]
 ) -> tuple[Recording, list[Trial], list[Declared]]:
@@ -274,48 +270,8 @@ def _trials(
     recording = with_goal(recording, settings.goal_m)
     trials = trials_of(recording, settings.split)
     recording = replace(recording, session=labelled(recording, trials, labels))
-    return recording, trials, _stated(recording, trials, settings)
-
-
-def _stated(recording: Recording, trials: Sequence[Trial], settings: ExtractSettings) -> list[Declared]:
-    """What is stated of each trial: by the user for all trials, else of the trial, else of the session."""
     given = {name: getattr(settings, name) for name in ("participant", "condition", "cycle", "set")}
-    given = {name: value for name, value in given.items() if value is not None}
-    known = entries_by_trial(recording.session.declared, recording, trials)
-    found = []
-    for number, trial in enumerate(trials):
-        own = known.get(number, Declared(int(recording.t_ns[trial.first])))
-        own = replace(own, participant=own.participant or recording.session.participant)
-        found.append(replace(own, **given))
-    return found
-
-
-def _row_notes(recording: Recording, without: Sequence[int], found: Sequence[Demonstration]) -> list[str]:
-    """The demonstrations without a row in the table of trials."""
-    numbers = [str(number) for one in found if (number := _number(one)) in set(without)]
-    if not numbers:
-        return []
-    which = f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}"
-    return [f"{recording.log}: `trials` has no row for {which}: what the log states of it counts"]
-
-
-def _guess_notes(recording: Recording, stated: Sequence[Declared]) -> list[str]:
-    """What is guessed of demonstrations, because nobody stated it.
-
-    Trials without a cycle beside others that have one are so on purpose.
-    """
-    by_force = "from joystick and contacts" if recording.wrench is not None else "from the joystick alone"
-    guesses = {
-        "participant": ("the log's name", any(one.participant is None for one in stated)),
-        "condition": (by_force, any(one.condition is None for one in stated)),
-        "cycle": ("none", all(one.cycle is None and one.set is None for one in stated)),
-    }
-    guessed = {name: how for name, (how, missing) in guesses.items() if missing}
-    if not guessed:
-        return []
-    words = ", ".join(f"{name} ({how})" for name, how in guessed.items())
-    remedy = f"state it with {', '.join(f'`{name}`' for name in guessed)}, or for each trial with `trials`"
-    return [f"{recording.log}: guessed, because it is not stated: {words}; {remedy}"]
+    return recording, trials, stated_of(recording, trials, given)
 
 
 def _observed(contacts: Sequence[Contact] | None, *, steered: bool) -> tuple[Condition, bool | None]:

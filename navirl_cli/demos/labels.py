@@ -1,22 +1,19 @@
 """What an experimenter states of each trial in a table: participant, condition, cycle and the like."""
 
 import os
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path, PurePosixPath
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.demos.trials import SAME_START_S, Trial, entries_by_trial
 from navirl_cli.documents.sheets import Line, read_sheet
 from navirl_cli.errors import LabelError, brief, unknown
-from navirl_cli.logs.recording import Declared, Recording, Session
 from navirl_cli.logs.roles.session import MOST_CORNERS, MOST_CYCLES, MOST_M, MOST_PEOPLE, MOST_RADIUS_M
 from navirl_cli.logs.sources import Source
 
@@ -26,7 +23,7 @@ STATED = ("participant", "condition", "cycle", "set", "robot_radius_m", "people_
 COLUMNS = (*WHERE, *SHOWN, *STATED)
 #: The cell people_m of a trial without people.
 NOBODY = "none"
-#: Trials that a message proposes in place of an unknown one.
+#: Names that a message lists.
 _NEAR = 3
 
 
@@ -210,115 +207,7 @@ def labels_by_source(labels: Labels, sources: Sequence[Source]) -> tuple[list[tu
     return [tuple(own) for own in rows], notes if others else []
 
 
-def labelled(recording: Recording, trials: Sequence[Trial], rows: Sequence[Label]) -> Session:
-    """The session with what the rows state in place of what it holds; empty cells change nothing.
-
-    Args:
-        recording: The log.
-        trials: Its trials.
-        rows: Of this log.
-
-    Raises:
-        LabelError: A row fits no trial, two rows fit one, or rows contradict each other about the robot.
-    """
-    session = recording.session
-    by_trial = _by_trial(recording, trials, rows)
-    known = entries_by_trial(session.declared, recording, trials)
-    replaced = {id(entry) for number, entry in known.items() if number in by_trial}
-    declared = [entry for entry in session.declared if id(entry) not in replaced]
-    for number, row in by_trial.items():
-        entry = known.get(number, Declared(int(recording.t_ns[trials[number].first])))
-        declared.append(replace(entry, **_stated(row, entry.participant or session.participant)))
-    declared.sort(key=lambda entry: entry.t_ns)
-    radius_m = session.robot_radius_m if (stated_m := _radius_m(rows)) is None else stated_m
-    return replace(session, declared=tuple(declared), robot_radius_m=radius_m)
-
-
-def without_row(recording: Recording, trials: Sequence[Trial], rows: Sequence[Label]) -> list[int]:
-    """The numbers of the trials that no row names, where there are rows at all."""
-    by_trial = _by_trial(recording, trials, rows)
-    return [number + 1 for number in range(len(trials)) if number not in by_trial] if rows else []
-
-
-def _stated(row: Label, participant: str | None) -> dict[str, Any]:
-    """What a row states of its trial, by field of :class:`Declared`; a participant only where it is another one."""
-    values = {name: getattr(row, name) for name in STATED if name != "robot_radius_m"}
-    if row.participant == participant:
-        del values["participant"]
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def _radius_m(rows: Sequence[Label]) -> float | None:
-    """The robot's radius, which all rows of a log share, m."""
-    stating = [row for row in rows if row.robot_radius_m is not None]
-    for row in stating[1:]:
-        if row.robot_radius_m != stating[0].robot_radius_m:
-            raise LabelError(
-                f"{row.where}, column robot_radius_m: expected {stating[0].robot_radius_m:g} as in "
-                f"{stating[0].where.rpartition(': ')[2]}, found {row.robot_radius_m:g}; a log has one robot"
-            )
-    return stating[0].robot_radius_m if stating else None
-
-
-def _by_trial(recording: Recording, trials: Sequence[Trial], rows: Sequence[Label]) -> dict[int, Label]:
-    """The row of each trial, by its place among the trials."""
-    starts_s = [start_s(recording, trial) for trial in trials]
-    found: dict[int, Label] = {}
-    for row in rows:
-        after = bisect_left(starts_s, row.start_s)
-        near = sorted(
-            range(max(after - _NEAR, 0), min(after + _NEAR, len(trials))), key=lambda n: _away(starts_s[n], row)
-        )
-        if not near or _away(starts_s[near[0]], row) > SAME_START_S:
-            listed = ", ".join(f"{n + 1} at {starts_s[n]:.1f} s" for n in sorted(near[:_NEAR]))
-            raise LabelError(
-                f"{row.where}, column start_s: expected the start of a trial of {recording.log}, found "
-                f"{row.start_s:g} s; " + (f"near are the trials {listed}" if near else "the log has no trials")
-            )
-        first = found.setdefault(near[0], row)
-        if first is not row:
-            raise LabelError(
-                f"{row.where}: expected one row for each trial, found a second for trial {near[0] + 1} of "
-                f"{recording.log} after that of {first.where.rpartition(': ')[2]}; remove one"
-            )
-    return found
-
-
-def _away(at_s: float, row: Label) -> float:
-    return abs(at_s - row.start_s)
-
-
-def start_s(recording: Recording, trial: Trial) -> float:
-    """When a trial starts, s since the log's first pose."""
-    return float(recording.t_ns[trial.first] - recording.t_ns[0]) / 1e9
-
-
-def check_agreement(labels: Labels, given: Mapping[str, Any]) -> None:
-    """Refuse a table that contradicts what is stated for whole logs.
-
-    Args:
-        labels: The table.
-        given: By column: the name of the argument and its value; None where it is not given.
-
-    Raises:
-        LabelError: A row states something else.
-    """
-    for row in labels.rows:
-        for column, (argument, value) in given.items():
-            stated = getattr(row, column)
-            if value is not None and stated is not None and not np.array_equal(np.asarray(stated), np.asarray(value)):
-                raise LabelError(
-                    f"{row.where}, column {column}: expected {_shown(value)}, which `{argument}` states for all logs, "
-                    f"found {_shown(stated)}; state it in one place"
-                )
-
-
 def points_text(points: ArrayLike) -> str:
     """(k, 2) points as a cell holds them."""
     several = np.asarray(points, dtype=float).tolist()
     return "; ".join(",".join(repr(value).removesuffix(".0") for value in point) for point in several) or NOBODY
-
-
-def _shown(value: Any) -> str:
-    """A value as a message shows it."""
-    return str(value) if isinstance(value, str | int | float) else points_text(value)

@@ -7,7 +7,7 @@ import numpy as np
 
 from navirl_cli.demos.checks import check_travel
 from navirl_cli.demos.contact import PushSettings, contacts_within, pushes_of
-from navirl_cli.demos.labels import start_s
+from navirl_cli.demos.labelling import start_s
 from navirl_cli.demos.lines import path_length_m
 from navirl_cli.demos.trials import Split, Trial, entries_by_trial, trials_of, with_goal
 from navirl_cli.errors import DemonstrationError

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
-from navirl_cli.demos.labels import Label, Labels, check_agreement, labels_by_source
+from navirl_cli.demos.labelling import check_agreement
+from navirl_cli.demos.labels import Label, Labels, labels_by_source
 from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
