@@ -14,11 +14,11 @@ from navirl_cli.demos.listing import TrialSettings, recording_of, trials_in
 from navirl_cli.errors import ArtefactError, LabelError, LogError, brief
 from navirl_cli.files import replacing
 from navirl_cli.logs.container.compressed import open_log
-from navirl_cli.logs.container.insertion import write_with_metadata, writing
+from navirl_cli.logs.container.insertion import is_walked, write_with_metadata, writing
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.messages.reader import Contents, Progress, scan
 from navirl_cli.logs.recording import SESSION_RECORD
-from navirl_cli.logs.roles.session import session_of, session_values
+from navirl_cli.logs.roles.session import session_values
 from navirl_cli.logs.sources import Source, sources_of
 
 #: Whole-file compression by the ending of a file's name.
@@ -127,17 +127,24 @@ def _record_notes(source: Source, before: Mapping[str, str], after: Mapping[str,
 def _write(log: Path, target: Path, ending: str, values: Mapping[str, str]) -> None:
     """Write the copy of one file, compressed by its name's ending, and read it back."""
     with open_log(log) as raw:
+        if raw.damage:
+            raise LogError(
+                f"{log}: expected a file that decompresses, found: {raw.damage[0].reason}; decompress what is left of "
+                "it, and annotate that"
+            )
         before = scan(raw)
-        with writing(target, _COMPRESSIONS.get(ending.lower(), "")) as stream:
-            write_with_metadata(raw, stream, SESSION_RECORD, values)
-    after = _scanned(target)
-    records = after.metadata.get(SESSION_RECORD, ({},))
-    if records[-1] != dict(values) or after.counts != before.counts:
-        raise LogError(
-            f"{log}: expected a log that takes another session record, found one whose end is missing and that has a "
-            "record already, or whose indexes are damaged; repair a copy with `mcap recover` first"
-        )
-    session_of(log.name, [after])
+        # behind damage that ends a walk the record would not be found
+        for in_front in (False, True) if is_walked(raw) else (False,):
+            with writing(target, _COMPRESSIONS.get(ending.lower(), "")) as stream:
+                write_with_metadata(raw, stream, SESSION_RECORD, values, in_front=in_front)
+            after = _scanned(target)
+            found = after.metadata.get(SESSION_RECORD, ({},))[-1]
+            if found == dict(values) and after.counts == before.counts and bool(after.damage) == bool(before.damage):
+                return
+    raise LogError(
+        f"{log}: expected a log that takes another session record, found one that is damaged where the record would "
+        "stand; repair a copy with `mcap recover` first"
+    )
 
 
 @contextmanager

@@ -38,49 +38,71 @@ def writing(path: Path, compression: str) -> Iterator[BinaryIO]:
         yield stream
 
 
-def write_with_metadata(raw: RawFile, target: BinaryIO, name: str, values: Mapping[str, str]) -> None:
+def write_with_metadata(
+    raw: RawFile, target: BinaryIO, name: str, values: Mapping[str, str], *, in_front: bool = False
+) -> None:
     """Write a file's bytes and a metadata record, which stands last in the data section.
 
     Statistics, indexes and CRCs are corrected. A CRC that is wrong stays wrong and a damaged summary damaged, so that
-    the copy reports the same damage. In a file without its end nothing points to bytes by number. There the record
-    stands after the header and metadata records that follow it.
+    the copy reports the same damage.
 
     Args:
         raw: The file, decompressed if it was compressed.
         target: Where to write.
         name: Of the record.
         values: Its texts by key.
+        in_front: Whether the record stands before the messages. Possible where :func:`is_walked`. A file without its
+            end has no other place for it.
 
     Raises:
         LogError: The file has no header.
     """
     record = _metadata(name, values)
-    data_start = read_header(raw)[2]
-    footer, tail = read_footer(raw), raw.size - records.TAIL_SIZE
-    if footer is None or not data_start <= (footer.summary_start or tail) <= tail:
-        place = _after_metadata(raw, data_start)
+    data_start, footer = read_header(raw)[2], _footer(raw)
+    if footer is None:
+        place = _front(raw, data_start, name)
         _copy(raw, target, 0, place)
         target.write(record)
         _copy(raw, target, place, raw.size)
         return
-    place, stop = _data_end(raw, footer)
+    end, stop = _data_end(raw, footer)
+    place = _front(raw, data_start, name) if in_front else end
     crc = _copy(raw, target, 0, place)
     target.write(record)
-    target.write(_with_crc(raw.read(place, stop), crc, record))
+    longer = _copy(raw, target, place, end, zlib.crc32(record, crc))
+    target.write(_with_crc(raw.read(end, stop), raw.crc(end), longer))
     for part in _ending(raw, footer, data_start, (place, name, record)):
         target.write(part)
 
 
-def _after_metadata(raw: RawFile, at: int) -> int:
-    """First byte after the metadata records that start at a byte."""
+def is_walked(raw: RawFile) -> bool:
+    """Whether readers walk over the file, because it has no intact summary: nothing points to bytes by number."""
+    footer = _footer(raw)
+    return footer is None or read_summary(raw, read_header(raw)[2], footer) is None
+
+
+def _footer(raw: RawFile) -> Footer | None:
+    """The footer; None where it is missing, or puts the summary outside of the file."""
+    footer, tail = read_footer(raw), raw.size - records.TAIL_SIZE
+    return footer if footer and read_header(raw)[2] <= (footer.summary_start or tail) <= tail else None
+
+
+def _front(raw: RawFile, at: int, name: str) -> int:
+    """Where a record stands in front: at a byte, or after records of the same name that stand there among others."""
+    place = at
     while True:
         head = raw.read(at, at + records.HEAD_SIZE)
         if len(head) < records.HEAD_SIZE:
-            return at
+            return place
         code, length = RECORD_HEAD.unpack(head)
         if code != records.METADATA or at + records.HEAD_SIZE + length > raw.size:
-            return at
+            return place
+        content = raw.read(at + records.HEAD_SIZE, at + records.HEAD_SIZE + length)
         at += records.HEAD_SIZE + length
+        try:
+            place = at if records.parse_metadata(content)[0] == name else place
+        except records.MALFORMED:
+            return place
 
 
 def _metadata(name: str, values: Mapping[str, str]) -> bytes:
@@ -98,9 +120,8 @@ def _record(code: int, content: bytes) -> bytes:
     return RECORD_HEAD.pack(code, len(content)) + content
 
 
-def _copy(raw: RawFile, target: BinaryIO, start: int, stop: int) -> int:
-    """Copy bytes [start, stop), and return their CRC."""
-    crc = 0
+def _copy(raw: RawFile, target: BinaryIO, start: int, stop: int, crc: int = 0) -> int:
+    """Copy bytes [start, stop), and return the CRC of all bytes so far, given that of those before."""
     for at in range(start, stop, BLOCK):
         block = raw.read(at, min(stop, at + BLOCK))
         crc = zlib.crc32(block, crc)
@@ -116,12 +137,12 @@ def _data_end(raw: RawFile, footer: Footer) -> tuple[int, int]:
     return (start, stop) if (code, length) == (records.DATA_END, 4) else (stop, stop)
 
 
-def _with_crc(data_end: bytes, crc: int, record: bytes) -> bytes:
-    """The data end record with the CRC of the longer section, where it had a right one."""
+def _with_crc(data_end: bytes, before: int, after: int) -> bytes:
+    """The data end record with the CRC of the longer section, where it had the right one of the section before."""
     if not data_end:
         return data_end
     code, length, written = _DATA_END.unpack(data_end)
-    return _DATA_END.pack(code, length, zlib.crc32(record, crc)) if written and written == crc else data_end
+    return _DATA_END.pack(code, length, after) if written and written == before else data_end
 
 
 def _ending(raw: RawFile, footer: Footer, data_start: int, added: tuple[int, str, bytes]) -> Iterator[bytes]:
