@@ -56,6 +56,7 @@ def test_a_row_states_everything_of_its_trial(log, table):
     assert first.people_m.tolist() == [[1, 1], [2, -1.25]]
     assert first.nominal_m.tolist() == [[0, 0], [1, 0.5], [4, 0]]
     assert (second.id, second.condition.value, second.cycle, second.set) == ("bert/2", "force", 1, None)
+    assert second.notes[-1] == "nobody was there, as stated"
     assert (len(second.people_m), second.nominal_m, second.robot_radius_m) == (0, None, 0.25)
 
 
@@ -287,6 +288,18 @@ def test_an_entry_of_a_session_record_belongs_to_one_trial(tmp_path):
     log = write_run(tmp_path / "run.mcap", Run(session=session, goals=TWO.goals))
     first, second = extract(load_recording(log), ExtractSettings()).demonstrations
     assert (first.cycle, second.cycle) == (2, None)
+
+
+def test_a_session_record_on_another_clock_is_reported(tmp_path):
+    session = {"trials": json.dumps([{"t_ns": 2_500_000_000, "cycle": 2}, {"t_ns": 3_000_000_000}])}
+    log = write_run(tmp_path / "run.mcap", Run(session=session))
+    notes = extract(load_recording(log), ExtractSettings()).notes
+    (note,) = [note for note in notes if "session record" in note]
+    assert (
+        "run.mcap: its session record labels no trial: of its 2 entries, the nearest to the first trial is 16999"
+        in note
+    )
+    assert note.endswith(" s away; correct t_ns, or choose another `time`")
 
 
 def test_trials_between_stops_are_labelled_too(log, table):

@@ -26,7 +26,7 @@ from navirl_cli.demos.trials import Split
 from navirl_cli.documents.tables import Format, written
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import LogError, NavirlError
-from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.logs.load import LoadOptions
 from navirl_cli.logs.overview import overview
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.reports.overview import overview_document, overview_report
@@ -87,7 +87,7 @@ def inspect(
         raise click.UsageError("--check excludes --trials.")
     if not trials and (settings != TrialSettings() or frame):
         raise click.UsageError("--split, --goal and --frame need --trials.")
-    options = LoadOptions(topics=topics_by_role(topics), frame=frame, forces=Forces.OPTIONAL)
+    options = LoadOptions(topics=topics_by_role(topics), frame=frame)
     refused: list[NavirlError] = []
     sources = _sources(logs, refused)
     if trials:

@@ -4,7 +4,7 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os import getpid
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from navirl_cli.errors import ArtefactError, LabelError, LogError, brief
 from navirl_cli.files import replacing
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.insertion import is_walked, write_with_metadata, writing
-from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.logs.load import LoadOptions
 from navirl_cli.logs.messages.reader import Contents, Progress, scan
 from navirl_cli.logs.recording import SESSION_RECORD
 from navirl_cli.logs.roles.session import session_values
@@ -66,7 +66,7 @@ def annotate(
     """
     source = _only_source(log)
     (rows,), notes = labels_by_source(labels, [source])
-    recording, trials = trials_in(recording_of(source, replace(options, forces=Forces.IGNORED), progress), settings)
+    recording, trials = trials_in(recording_of(source, options, progress), settings)
     stating = sum(row.states for row in rows)
     if not stating:
         raise LabelError(

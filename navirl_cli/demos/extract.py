@@ -22,7 +22,7 @@ from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, push
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
 from navirl_cli.demos.grid import Grid, grid_from_occupancy
-from navirl_cli.demos.labelling import guess_notes, labelled, row_notes, stated_of
+from navirl_cli.demos.labelling import guess_notes, labelled, record_notes, row_notes, stated_of
 from navirl_cli.demos.labels import Label
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
@@ -119,7 +119,11 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     own = {(number := _number(one)): stated[number - 1] for one in found}
-    notes += [*row_notes(recording, trials, labels, own), *guess_notes(recording, own.values())]
+    notes += [
+        *record_notes(recording, trials),
+        *row_notes(recording, trials, labels, own),
+        *guess_notes(recording, own.values()),
+    ]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
@@ -210,7 +214,7 @@ def _demonstration(
         set=declared.set,
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
-        notes=(*notes, *people.notes, *people_notes(recording, people.people_m)),
+        notes=(*notes, *people.notes),
     )
 
 
@@ -223,12 +227,16 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
 
 
 def _people(recording: Recording, settings: ExtractSettings, declared: Declared, span_ns: tuple[int, int]) -> People:
-    """The people of a trial: those placed by the user, else those that were stated, else those of the log."""
+    """The people of a trial, with notes: those placed by the user, else those that were stated, else the log's."""
     if settings.people_m is not None:
-        return People(np.array(settings.people_m))
-    if declared.people_m is not None:
-        return People(declared.people_m)
-    return people_during(recording, *span_ns)
+        people = People(np.array(settings.people_m))
+    elif declared.people_m is None:
+        people = people_during(recording, *span_ns)
+    elif len(declared.people_m):
+        people = People(declared.people_m)
+    else:
+        return People(declared.people_m, notes=("nobody was there, as stated",))
+    return replace(people, notes=(*people.notes, *people_notes(recording, people.people_m)))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

@@ -155,6 +155,17 @@ def row_notes(
     return [f"{recording.log}: `trials` has no row for {which}: what the log states of it counts"]
 
 
+def record_notes(recording: Recording, trials: Sequence[Trial]) -> list[str]:
+    """A line on a session record whose entries fit no trial, for instance because they are on another clock."""
+    entries = recording.session.declared
+    if not entries or not trials or entries_by_trial(entries, recording, trials):
+        return []
+    start_ns = int(recording.t_ns[trials[0].first])
+    away_s = min(abs(entry.t_ns - start_ns) for entry in entries) / 1e9
+    found = f"of its {len(entries)} entries, the nearest to the first trial is {away_s:.1f} s away"
+    return [f"{recording.log}: its session record labels no trial: {found}; correct t_ns, or choose another `time`"]
+
+
 def guess_notes(recording: Recording, stated: Collection[Declared]) -> list[str]:
     """What is guessed of demonstrations, because nobody stated it.
 

@@ -56,7 +56,7 @@ class Listing:
 
 
 def recording_of(source: Source, options: LoadOptions, progress: Progress | None = None) -> Recording:
-    """A recording in which trials are found: its map may be missing, because trials do not depend on it.
+    """A recording in which trials are found: map and wrench may be missing, as trials do not need them.
 
     Raises:
         LogError: As :func:`navirl_cli.logs.load.load_recording`.
@@ -68,7 +68,8 @@ def recording_of(source: Source, options: LoadOptions, progress: Progress | None
     choices = choose(source.name, topics_of(contents), options.topics)
     if options.occupancy is None and not (choices["map"].topics or choices["map"].ambiguous):
         options = replace(options, occupancy=Occupancy(np.zeros((1, 1), dtype=np.int8), 1.0, (0.0, 0.0)))
-    return load_recording(source, options, progress)
+    forces = Forces.OPTIONAL if options.forces is Forces.NEEDED else options.forces
+    return load_recording(source, replace(options, forces=forces), progress)
 
 
 def trials_in(recording: Recording, settings: TrialSettings) -> tuple[Recording, list[Trial]]:
@@ -96,8 +97,7 @@ def list_trials(
         LogError: The log cannot be read.
         DemonstrationError: It has no goals at which trials could start.
     """
-    forces = Forces.OPTIONAL if options.forces is Forces.NEEDED else options.forces
-    recording, trials = trials_in(recording_of(source, replace(options, forces=forces), progress), settings)
+    recording, trials = trials_in(recording_of(source, options, progress), settings)
     if not trials:
         raise DemonstrationError(f"{recording.log}: no trial: no goal is announced while poses are recorded")
     pushes = None if recording.wrench is None else pushes_of(recording, PushSettings())
