@@ -7,10 +7,12 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
+import fuzzing
 import pytest
 import small_logs
 import strict_log
 from mcap.reader import make_reader
+from mutations import mutant
 from robot_log import START_NS, Run, write_run
 
 from navirl_cli.demos.annotate import annotate
@@ -231,6 +233,33 @@ def test_a_record_inside_a_log_without_its_end_is_refused(tmp_path, robot_table)
     ):
         annotated(log, other, tmp_path / "copy.mcap")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["log.mcap", "trials.csv"]
+
+
+@pytest.mark.parametrize("numbers", [range(60), pytest.param(range(60, 960), marks=pytest.mark.slow)], ids=str)
+def test_a_broken_log_is_refused_or_its_copy_gives_the_same(tmp_path, table, numbers):
+    logs = fuzzing.logs()
+    copies = 0
+    for number in numbers:
+        log, copy = tmp_path / f"{number}.mcap", tmp_path / f"copy{number}.mcap"
+        log.write_bytes(mutant(number, logs, seed=13).data)
+        try:
+            annotated(log, table, copy)
+        except NavirlError:
+            assert not copy.exists()
+            continue
+        copies += 1
+        (before, lost), (after, still) = outcome(log, table), outcome(copy, None)
+        assert before == after, number
+        assert bool(lost) == bool(still), number
+    assert copies > len(numbers) / 4
+
+
+def outcome(log, labels):
+    """Demonstrations and losses, or that it is refused."""
+    try:
+        return demos(log, labels=labels)
+    except NavirlError:
+        return "refused", []
 
 
 def bag(tmp_path, variants, *names, record_in=None):
