@@ -15,6 +15,7 @@ from navirl_cli.errors import NavirlError
 #: _ for -. It is imported when the command is called, so that help and completion are fast.
 COMMANDS = {
     "inspect": "Show the content of logs, and the topics that extract would use.",
+    "annotate": "Write the labels of trials into a copy of a log.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
