@@ -18,7 +18,7 @@ ORDERS = {
         ["irl"],
         ["evaluation"],
         ["study", "simulation", "published", "planning"],
-        ["artefacts"],
+        ["artefacts", "export"],
         ["reports"],
         ["figures"],
         ["api"],

@@ -4,7 +4,7 @@ A planner pays for length and for the cost of the cells that it enters. Only the
 the reward of a cell is divided by the reward c0 h of a cell's side, and multiplied by what the planner pays for a cell
 without cost (facts in nav2_navfn_planner and nav2_smac_planner of ros-navigation/navigation2):
 
-    NavFn        50 + 0.8 c for each cell, as long as the way through it is
+    NavFn          50 + 0.8 c for each cell of length
     SmacPlanner2D  length (1 + m c / 252), with cost_travel_multiplier m
 
 The planners drive the one path of least cost, while a policy weighs all paths by exp(reward). The least costly path
