@@ -94,8 +94,8 @@ class CostModel:
         """Refuse a reward that no planner can drive."""
         if self._theta.get("c0", 0.0) >= 0:
             raise RewardError(
-                f"expected a reward with a cost of path length (c0 below 0), found c0 = {self._theta.get('c0', 0.0):g}; "
-                "a planner's costs are relative to it"
+                "expected a reward with a cost of path length (c0 below 0), to which a planner's costs are relative, "
+                f"found c0 = {self._theta.get('c0', 0.0):g}"
             )
 
     @property
