@@ -285,6 +285,11 @@ def test_a_map_with_occupied_cells_on_the_path_is_reported(make):
 def test_people_in_a_wall_or_off_the_map_are_noted(make):
     d = one(make(obstacles=((30, 27),)), people_m=((1.95 + 0.03, 1.2), (90.0, 0.0)))
     assert d.notes == (
+        "people by `person`: 2; in the log: 1; those of the log are ignored",
+        (
+            "`person` 90.00,0.00 contradicts the log, whose nearest person is 88.00 m from there, at x 2.00 m, y 0.90 "
+            "m; the log's people are ignored"
+        ),
         "a person at x 1.98 m, y 1.20 m stands in a wall of the map",
         "a person at x 90.00 m, y 0.00 m stands off the map",
     )

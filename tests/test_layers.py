@@ -43,7 +43,13 @@ ORDERS = {
         ["survey", "opener"],
         ["log_file"],
     ],
-    "navirl_cli.logs.messages": [["__init__", "schema"], ["layout"], ["decode", "writer"], ["series"], ["reader"]],
+    "navirl_cli.logs.messages": [
+        ["__init__", "schema", "single"],
+        ["layout"],
+        ["decode", "writer"],
+        ["series"],
+        ["reader"],
+    ],
     "navirl_cli.logs.tf": [["__init__", "rotations"], ["transforms"], ["tree"]],
 }
 

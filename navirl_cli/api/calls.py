@@ -84,6 +84,7 @@ def extract(
     frame: str | None = None,
     no_wrench: bool = False,
     wrench_frame: str | None = None,
+    force_scale: float = 1.0,
     time: str = "header",
     join: bool = False,
     strict: bool = False,
@@ -116,6 +117,7 @@ def extract(
         frame: Frame of all results, instead of the map's frame.
         no_wrench: Ignore forces; also for logs without a wrench. Contact is then unknown.
         wrench_frame: Frame of the wrench, instead of the frame in its header.
+        force_scale: Newtons for the unit of the wrench's forces: 1000 for kN, 0.001 for mN.
         time: Time of a message: the stamp in its "header", or the time of receipt in the "log".
         join: Treat all logs as parts of one recording.
         strict: Refuse damaged logs.
@@ -135,8 +137,8 @@ def extract(
     """
     if not logs:
         raise ArgumentError("`logs`: expected at least one log, found none")
-    if no_wrench and (gain or wrench_frame):
-        raise ArgumentError("`no_wrench` excludes `gain` and `wrench_frame`, which need the wrench")
+    if no_wrench and (gain or wrench_frame or force_scale != 1):
+        raise ArgumentError("`no_wrench` excludes `gain`, `wrench_frame` and `force_scale`, which need the wrench")
     settings = ExtractSettings(
         split=chosen(Split, split, "split"),
         resolution_m=within("resolution", resolution, 0.01, 2),
@@ -160,6 +162,7 @@ def extract(
         time=chosen(TimeSource, time, "time"),
         frame=frame,
         wrench_frame=wrench_frame,
+        force_scale=within("force_scale", force_scale, 0, 1e9, above=True),
         occupancy=None if map_file is None else read_map(map_file),
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,

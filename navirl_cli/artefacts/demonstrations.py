@@ -64,6 +64,7 @@ def settings_document(
         "time": options.time.value,
         "frame": options.frame,
         "wrench_frame": options.wrench_frame,
+        "force_scale": options.force_scale,
         "wrench": options.forces is not Forces.IGNORED,
         "map": None if map_file is None else map_file.name,
         "trials": None if trials is None else trials.name,

@@ -63,6 +63,13 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
     ),
     click.option("--wrench-frame", help="Frame of the wrench, instead of the frame in its header."),
     click.option(
+        "--force-scale",
+        metavar="FACTOR",
+        default=1.0,
+        type=Number(0, 1e9, min_open=True),
+        help="Newtons for the unit of the wrench's forces: 1000 for kN, 0.001 for mN.  [default: 1]",
+    ),
+    click.option(
         "--time",
         "time_source",
         type=Choice([source.value for source in TimeSource]),
@@ -155,6 +162,7 @@ def extract(
     frame: str | None,
     no_wrench: bool,
     wrench_frame: str | None,
+    force_scale: float,
     time_source: str,
     join: bool,
     strict: bool,
@@ -175,8 +183,8 @@ def extract(
     pass through the sensor is not measured.
     """
     chosen = topics_by_role(topics)
-    if no_wrench and (gain or wrench_frame or "wrench" in chosen):
-        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame and --topic wrench=/NAME.")
+    if no_wrench and (gain or wrench_frame or force_scale != 1 or "wrench" in chosen):
+        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame, --force-scale and --topic wrench=/NAME.")
     files = [one for one in (map_file, trials) if one is not None]
     check_output(output, [*logs, *files], force=force)
     settings = ExtractSettings(
@@ -198,6 +206,7 @@ def extract(
         time=TimeSource(time_source),
         frame=frame,
         wrench_frame=wrench_frame,
+        force_scale=force_scale,
         occupancy=None if map_file is None else read_map(map_file),
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,

@@ -9,6 +9,7 @@ import numpy as np
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.demos.checks import (
     check_cells,
+    check_end,
     check_gaps,
     check_goal,
     check_start,
@@ -16,6 +17,7 @@ from navirl_cli.demos.checks import (
     jump_notes,
     path_notes,
     people_notes,
+    placed_notes,
     recording_notes,
 )
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
@@ -27,7 +29,7 @@ from navirl_cli.demos.labels import Label
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, entries_by_trial, trials_of, with_goal
-from navirl_cli.errors import DemonstrationError, NavirlError
+from navirl_cli.errors import MOST_NAMES, DemonstrationError, NavirlError, joined
 from navirl_cli.logs.recording import Declared, Recording
 
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
@@ -114,8 +116,12 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         except NavirlError as error:
             skipped.append((number, str(error)))
     if not found:
-        reasons = "; ".join(_grouped(skipped)) or "no goal is announced while poses are recorded"
-        raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
+        reasons = _grouped(skipped) or ["no goal is announced while poses are recorded"]
+        prefix = f"{recording.log}: "
+        # what was lost on the way may be the cause
+        raise DemonstrationError(
+            f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
+        )
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     own = {(number := _number(one)): stated[number - 1] for one in found}
@@ -162,9 +168,14 @@ def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
     for number, reason in skipped:
         by_reason.setdefault(reason, []).append(str(number))
     return [
-        f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: {reason}"
-        for reason, numbers in by_reason.items()
+        f"trial{'s' if len(numbers) > 1 else ''} {_numbers(numbers)}: {reason}" for reason, numbers in by_reason.items()
     ]
+
+
+def _numbers(numbers: Sequence[str]) -> str:
+    """Numbers of trials, of many the first ones."""
+    more = f" and {len(numbers) - MOST_NAMES} others" if len(numbers) > MOST_NAMES else ""
+    return ", ".join(numbers[:MOST_NAMES]) + more
 
 
 def _demonstration(
@@ -183,8 +194,8 @@ def _demonstration(
     check_travel(xy)
     check_gaps(recording, trial, pushes)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
-    people = _people(recording, settings, declared, (start_ns, stop_ns))
     radius_m = _radius_m(recording, settings)
+    people = _people(recording, settings, declared, trial, radius_m)
     check_start(people.people_m, xy[0], radius_m)
     cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
@@ -226,17 +237,20 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
     return cells, free
 
 
-def _people(recording: Recording, settings: ExtractSettings, declared: Declared, span_ns: tuple[int, int]) -> People:
-    """The people of a trial, with notes: those placed by the user, else those that were stated, else the log's."""
-    if settings.people_m is not None:
-        people = People(np.array(settings.people_m))
-    elif declared.people_m is None:
-        people = people_during(recording, *span_ns)
-    elif len(declared.people_m):
-        people = People(declared.people_m)
-    else:
-        return People(declared.people_m, notes=("nobody was there, as stated",))
-    return replace(people, notes=(*people.notes, *people_notes(recording, people.people_m)))
+def _people(
+    recording: Recording, settings: ExtractSettings, declared: Declared, trial: Trial, radius_m: float
+) -> People:
+    """The people of a trial: those placed by the user, else by labels, with what contradicts them; else the log's."""
+    xy = recording.xy_m[trial.first : trial.stop]
+    logged = people_during(recording, int(recording.t_ns[trial.first]), int(recording.t_ns[trial.stop - 1]))
+    by = "`person`" if settings.people_m is not None else "people_m"
+    placed = declared.people_m if settings.people_m is None else np.array(settings.people_m)
+    if placed is None:
+        return replace(logged, notes=(*logged.notes, *people_notes(recording, logged.people_m)))
+    check_end(placed, xy[-1], radius_m, by)
+    known = logged.people_m if len(recording.people_t_ns) else None
+    notes = placed_notes(placed, known, xy, radius_m, by)
+    return People(placed, notes=(*notes, *(people_notes(recording, placed) if len(placed) else ["nobody was there"])))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

@@ -10,10 +10,11 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
 from navirl_cli.demos.labelling import check_agreement
 from navirl_cli.demos.labels import Label, Labels, labels_by_source
-from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError
+from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, joined
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
+from navirl_cli.logs.roles.topics import HOLDS
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import map_in_order
 
@@ -98,7 +99,7 @@ def extract_recordings(
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
-        raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
+        raise DemonstrationError(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),
@@ -117,6 +118,18 @@ def _rows(
     radius, people = ("robot_radius", settings.robot_radius_m), ("person", settings.people_m)
     check_agreement(labels, {**stated, "robot_radius_m": radius, "people_m": people})
     return labels_by_source(labels, sources)
+
+
+def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
+    """Each reason once, with the log or the number of logs that it concerns; the commonest first."""
+    logs: dict[str, list[str]] = {}
+    for error in failed:
+        log, colon, reason = str(error).partition(": ")
+        # of the topics that a log holds, another log may hold others
+        key = (reason if colon else log).partition(HOLDS)[0]
+        logs.setdefault(key, []).append(log if colon else "")
+    ordered = sorted(logs.items(), key=lambda item: -len(item[1]))
+    return [f"{own[0] if len(own) == 1 else f'{len(own)} logs'}: {reason}" for reason, own in ordered]
 
 
 def _counted(

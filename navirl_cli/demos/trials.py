@@ -73,11 +73,8 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
         return [Trial(0, len(recording.t_ns), None)]
     if split is Split.STOP:
         return _between_rests(recording.t_ns, standing)
-    if len(recording.goal_t_ns) == 0:
-        raise DemonstrationError(
-            f"{recording.log}: no goal is announced, so that trials cannot be split at goals; "
-            "give one with `goal` x,y, or choose `split` stop or `split` none"
-        )
+    if recording.goal_problem:
+        raise DemonstrationError(recording.goal_problem)
     return _at_goals(recording, standing)
 
 

@@ -106,6 +106,10 @@ class Session(ByContent):
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
+#: Fewer forces have no bias that could be told from a push.
+LEAST_FORCES = 50
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Everything of one log, on one clock and in one fixed frame."""
@@ -132,6 +136,8 @@ class Recording:
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
+    #: Why there is no goal where there is none, as far as it is known: "1 messages on /goal_pose left out: ...".
+    no_goal: str = ""
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
     #: What is unusual about the log, in words.
@@ -147,3 +153,25 @@ class Recording:
             raise LogError(
                 f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
             )
+        if self.wrench is not None:
+            self._check_wrench(self.wrench.t_ns)
+
+    def _check_wrench(self, t_ns: IntArray) -> None:
+        """Check that there are enough forces to find a bias, and that they were measured while the robot drove."""
+        if len(t_ns) < LEAST_FORCES:
+            raise LogError(f"{self.log}: expected a wrench of at least {LEAST_FORCES} messages, found {len(t_ns)}")
+        if t_ns[0] > self.t_ns[-1] or t_ns[-1] < self.t_ns[0]:
+            raise LogError(
+                f"{self.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
+                f"{(int(t_ns[0]) - int(self.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
+            )
+
+    @property
+    def goal_problem(self) -> str:
+        """Why trials cannot be split at goals, and what to do; empty where there are goals."""
+        if len(self.goal_t_ns):
+            return ""
+        remedy = "give one with `goal` x,y, or choose `split` stop or `split` none"
+        if self.no_goal:
+            return f"{self.log}: trials cannot be split at goals, because no goal is left: {self.no_goal}; or {remedy}"
+        return f"{self.log}: no goal is announced, so that trials cannot be split at goals; {remedy}"
