@@ -48,6 +48,10 @@ class ArtefactError(NavirlError):
     """A file that navirl reads or writes is missing, exists already or breaks its schema."""
 
 
+class LabelError(ArtefactError):
+    """A table of trials does not fit the logs."""
+
+
 class MissingPackageError(NavirlError):
     """An optional package is not installed."""
 

@@ -18,7 +18,7 @@ ORDERS = {
         ["irl"],
         ["evaluation"],
         ["study", "simulation", "published", "planning"],
-        ["artefacts"],
+        ["artefacts", "export"],
         ["reports"],
         ["figures"],
         ["api"],
@@ -38,7 +38,7 @@ ORDERS = {
         ["__init__", "damage", "records"],
         ["batches", "raw", "sniff"],
         ["chunks", "compressed", "summary"],
-        ["resync"],
+        ["resync", "insertion"],
         # what the pieces define reaches the survey through `batches.Definitions`, which both are given
         ["survey", "opener"],
         ["log_file"],

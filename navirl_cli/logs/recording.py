@@ -10,9 +10,9 @@ from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import LogError
 
 #: Name of the metadata record with what only the experimenter knows. Its keys: "participant", a name; and in JSON
-#: "trials", a list of objects with "t_ns", the time of the trial's goal, and any of "stop_ns", "cycle", "condition",
-#: "set" and "nominal_m"; "robot_radius_m"; "completion_s", lists of times by modality; and, where positions came
-#: without times, "laid_out_m_s", the speed at which they were laid out.
+#: "trials", a list of objects with "t_ns", the time of the trial's goal or start, and any of "stop_ns", "participant",
+#: "cycle", "condition", "set", "nominal_m" and "people_m"; "robot_radius_m"; "completion_s", lists of times by
+#: modality; and, where positions came without times, "laid_out_m_s", the speed at which they were laid out.
 SESSION_RECORD = "navirl.session"
 #: Name of the metadata record with cells that were published with the paths: key "cells", a JSON list of objects with
 #: "t_ns" (as above), "name" and "cells" (pairs column, row).
@@ -76,6 +76,10 @@ class Declared(ByContent):
     set: str | None = None
     #: (k, 2) m, fixed frame: the line that the robot's navigation followed.
     nominal_m: FloatArray | None = None
+    #: In place of the session's, where several participants took part.
+    participant: str | None = None
+    #: (p, 2) m, fixed frame: where people stood, none of them with p = 0; None where the log's messages count.
+    people_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
