@@ -35,7 +35,7 @@ from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps, select
-from navirl_cli.reports.fit import remarks, report, warnings
+from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
 @click.command(
@@ -179,6 +179,8 @@ def fit(
     if earlier is not None and not initial:
         start = earlier.reward
     questions.check(evidence, start)
+    for line in cannot_learn(chosen):
+        say(line)
     found, analyses, lost = answers(
         evidence,
         _learn(evidence, start, earlier, l2, Method(method)),
