@@ -101,8 +101,9 @@ def test_rotations():
 def test_odometry_and_tf_take_the_same_quaternions(length):
     quaternion = np.array([[0.0, 0.0, length, 0.0]])
     link = Link("map", "odom", np.ones(1, dtype=np.int64), np.zeros((1, 3)), quaternion)
-    _, ignored = Curve.of([link], "map", "odom", fixed=False, zeros=False)
-    assert are_rotations(quaternion).tolist() == [ignored == 0] == [0.9 < length < 1.1]
+    _, faults = Curve.of([link], "map", "odom", fixed=False, zeros=False)
+    assert are_rotations(quaternion).tolist() == [not faults.ignored] == [0.9 < length < 1.1]
+    assert bool(faults.rescaled) == (length in (0.91, 1.09))
 
 
 @pytest.mark.parametrize(

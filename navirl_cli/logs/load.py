@@ -169,10 +169,12 @@ def _context(
     )
     map_and_frame = map_in(log, columns["map"]) if options.occupancy is None else (options.occupancy, "")
     context = Context(log, clock, tree, options.frame or map_and_frame[1] or _MAP_FRAME)
-    for (parent, child), count in tree.ignored.items():
-        context.note(
-            f"{count} transforms {parent} -> {child} are implausible, or were sent before the clock ran; ignored"
-        )
+    for (parent, child), some in tree.faults.items():
+        for faults in some:
+            if faults.ignored:
+                context.note(f"transforms {parent} -> {child}: {faults}; ignored")
+            if faults.rescaled:
+                context.note(f"transforms {parent} -> {child}: {faults.rescaled}")
     return context, map_and_frame
 
 
