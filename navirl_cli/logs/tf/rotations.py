@@ -38,7 +38,7 @@ def faults(quaternions: FloatArray) -> dict[str, BoolArray]:
         By reason, as in "3 with ...": which ones, shape (n,); only reasons that occur.
     """
     good, length = are_rotations(quaternions), _lengths(quaternions)
-    finite: BoolArray = np.isfinite(quaternions).all(axis=1)
+    finite: BoolArray = np.array(np.isfinite(quaternions).all(axis=1))
     wrong = finite & ~good & (length > _ZERO)
     example = f"{math.hypot(*quaternions[wrong][0].tolist()):.3g}" if wrong.any() else ""
     found: dict[str, BoolArray] = {
