@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from navirl_cli.logs.load import LoadOptions, load_recording
-from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource, in_order
+from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource
+from navirl_cli.logs.roles.columns import Columns
+from navirl_cli.logs.roles.message_types import WRENCHES
+from navirl_cli.logs.roles.times import in_order, without_repeats
 
 OTHER = "run.mcap: /wrench is stamped by another clock than /odom: "
 WILD = "run.mcap: 1 messages on {topic} have stamps more than 1 s off their clock; their times of receipt are used"
@@ -117,12 +120,12 @@ def test_without_any_stamps_times_of_receipt_are_used(load):
 
 def test_some_stamps_of_0_are_received_times(load):
     recording = load(**everywhere(lambda seconds: np.where(seconds < 1.5, 0, nav.simulated(100.0)(seconds))))
-    assert recording.notes == (
+    assert set(recording.notes) == {
         "run.mcap: transforms map -> odom: 15 stamped 0 before the clock ran; ignored",
         "run.mcap: 10 poses lie outside the time that tf covers; left out",
         "run.mcap: 30 messages on /odom are stamped 0; their times of receipt are used",
         "run.mcap: 150 messages on /wrench are stamped 0; their times of receipt are used",
-    )
+    }
     # tf begins late: poses up to a second earlier are placed by the first transform
     assert (recording.t_ns[0] - nav.simulated(100.0)(0)) / 1e9 == pytest.approx(0.5, abs=0.02)
     assert misaligned_s(recording).max() < 0.02
@@ -338,9 +341,12 @@ def test_messages_out_of_order_and_twice(load):
 
 
 def test_of_equal_times_the_first_counts():
-    rows, notes = in_order("/t", np.array([3, 1, 3, 2]))
-    assert rows.tolist() == [1, 3, 0]
-    assert notes == [
+    times = np.array([3, 1, 3, 2])
+    ordered, late = in_order(Columns("/t", WRENCHES[1], times, np.arange(4), {"fx": np.arange(4)}, None))
+    first, twice = without_repeats(ordered)
+    assert first.t_ns.tolist() == [1, 2, 3]
+    assert first["fx"].tolist() == [1, 3, 0]
+    assert [str(one) for one in (*late, *twice)] == [
         "2 messages on /t were received out of order; sorted by time",
         "1 messages on /t repeat the time of another; the first counts",
     ]
@@ -373,7 +379,7 @@ def test_few_messages_make_a_clock(n):
     clock = Clock(stamped(times + 7, times))
     assert clock.times(clock.reference).tolist() == (times + 7).tolist()
     assert clock.times(Stamped("/cmd_vel", times, None)).tolist() == (times + 7).tolist()
-    assert clock.notes == []
+    assert clock.findings == []
 
 
 def test_a_recorder_that_gives_all_messages_one_time():

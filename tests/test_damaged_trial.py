@@ -103,10 +103,13 @@ def test_inspect_lists_damage(written, navirl, broken):
     assert re.search(words, told)
 
 
-def test_damage_inside_of_chunks_shows_only_where_they_are_opened(written, navirl):
+def test_inspect_reports_the_damage_that_extract_finds(written, navirl):
     path = written("zstd")
     wrong_crc(path)
-    assert navirl("inspect", path).stderr == ""
+    inspected = navirl("inspect", path, code=3).stderr
+    assert inspected.strip()
+    extracted = navirl("extract", path, "-o", path.with_suffix(".json"), code=3).stderr
+    assert all(line in extracted for line in inspected.splitlines())
 
 
 @pytest.mark.parametrize(("topic", "number", "back"), [("/wrench", 700, 48), ("/odom", 200, 84 * 8)])

@@ -27,11 +27,12 @@ ORDERS = {
         ["__main__"],
     ],
     "navirl_cli.logs": [
-        ["__init__", "recording", "yaml_file"],
+        ["__init__", "findings", "recording", "yaml_file"],
         ["container", "tf"],
         ["messages", "sources", "map_file"],
         ["roles"],
-        ["load", "overview"],
+        ["load"],
+        ["overview"],
     ],
     "navirl_cli.logs.container": [
         ["__init__", "damage", "records"],

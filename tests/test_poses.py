@@ -5,15 +5,14 @@ import numpy as np
 import pytest
 
 from navirl_cli.errors import FrameError, LogError
+from navirl_cli.logs.findings import Kind
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.logs.roles.clocks import Clock, TimeSource
+from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.columns import Columns
-from navirl_cli.logs.roles.context import Context
 from navirl_cli.logs.roles.message_types import POSES, TF, TF_STATIC
-from navirl_cli.logs.roles.poses import poses_of
-from navirl_cli.logs.tf.transforms import links_of
-from navirl_cli.logs.tf.tree import TransformTree
+from navirl_cli.logs.roles.space import in_one_frame
+from navirl_cli.logs.roles.times import on_one_clock
 
 
 class Run:
@@ -331,22 +330,18 @@ def test_poses_in_the_map_that_leap(load):
 
 @nav.needs_real
 def test_a_real_robots_odometry_agrees_with_its_localisation():
-    types = {"/odom": POSES[0], "/amcl_pose": POSES[1], "/tf": TF, "/tf_static": TF_STATIC}
-    found = read(nav.REAL, {topic: tuple(one.fields.values()) for topic, one in types.items()})
+    types = {"odometry": POSES[0], "amcl": POSES[1], "tf": TF, "tf_static": TF_STATIC}
+    topics = {"odometry": "/odom", "amcl": "/amcl_pose", "tf": "/tf", "tf_static": "/tf_static"}
+    found = read(nav.REAL, {topics[role]: tuple(one.fields.values()) for role, one in types.items()})
     assert found.damage == ()
-    columns = {topic: Columns.of(found.series[topic], one) for topic, one in types.items()}
-    links = {
-        topic: links_of({TF.fields[name]: columns[topic][name] for name in TF.fields}, columns[topic].owner_counts)
-        for topic in ("/tf", "/tf_static")
-    }
-    clock = Clock(columns["/odom"].stamped())
-    context = Context("real", clock, TransformTree(links["/tf_static"], links["/tf"]), "map")
-    poses = poses_of(columns["/odom"], context)
-    assert clock.simulated
-    assert (clock.notes, context.notes, context.lost) == ([], [], [])
+    columns = {role: [Columns.of(found.series[topics[role]], one)] for role, one in types.items()}
+    (amcl,) = columns.pop("amcl")
+    timed = on_one_clock("real", columns, TimeSource.HEADER)
+    placed = in_one_frame("real", timed.tables, "map", None, None)
+    poses = placed.poses
+    assert [one.kind for one in (*timed.findings, *placed.findings)] == [Kind.SIMULATED]
     assert len(poses.t_ns) == 2639
     assert poses.base == "base_link"
-    amcl = columns["/amcl_pose"]
     begin, times = int(poses.t_ns[0]), amcl["stamp"]
     both = (times >= begin) & (times <= poses.t_ns[-1])
     # the first pose was published, and latched, before the recording began

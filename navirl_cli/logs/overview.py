@@ -1,4 +1,7 @@
-"""What is in a recording, found quickly: from indexes, and from the first messages where indexes do not suffice."""
+"""What is in a recording, and whether extract can use it: the same line of stages as extract's, and tables of topics.
+
+The tables come from indexes, and from the first messages where indexes do not suffice.
+"""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -13,15 +16,15 @@ from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
+from navirl_cli.logs.findings import Severity
+from navirl_cli.logs.load import Line, LoadOptions, follow
 from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
-from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped
-from navirl_cli.logs.roles.topics import Choice, Topic, choose, is_missing, topics_of
+from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
+from navirl_cli.logs.roles.topics import Choice, Topic, is_missing, topics_of
 from navirl_cli.logs.sources import Source
-from navirl_cli.logs.tf.transforms import Link, links_of
-from navirl_cli.logs.tf.tree import TransformTree
 
 #: A topic with messages at least this often is regular, s. It has a gap where it pauses this many times longer than
 #: usual, and for at least this long, s.
@@ -65,12 +68,31 @@ class Overview:
     start_ns: int | None
     end_ns: int | None
     flows: tuple[Flow, ...]
-    choices: dict[str, Choice]
-    #: What is lost, and what is unusual about clocks, in words.
+    #: What extract would make of it.
+    line: Line
+    #: What is lost, in words.
     damage: tuple[str, ...]
-    clocks: tuple[str, ...]
-    #: How the frames of the first transforms connect, "map -> odom -> base_link"; empty without tf.
-    frames: str
+
+    @property
+    def choices(self) -> Mapping[str, Choice]:
+        """The topics by role."""
+        return self.line.choices
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What is unusual about clocks, frames and measurements, in words; losses are in `damage`."""
+        return tuple(dict.fromkeys(str(one) for one in self.line.findings if one.kind.severity is not Severity.LOSS))
+
+    @property
+    def frames(self) -> str:
+        """How the frames connect, "map -> odom -> base_link"; empty without tf."""
+        tree = self.line.placed.context.tree if self.line.placed else None
+        return tree.describe() if tree and tree.frames else ""
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """Why extract refuses the log although each needed role has a topic, in words."""
+        return () if self.needed else tuple(dict.fromkeys(map(str, self.line.refusals)))
 
     @property
     def reference_s(self) -> float:
@@ -103,8 +125,8 @@ def overview(
         files = [stack.enter_context(open_log(path)) for path in source.files]
         timed = [message_times(file) for file in files]
         contents = tuple(one for one, _ in timed)
-        choices = choose(source.name, topics_of(contents), requested)
-        stamped, frames = _first_messages(files)
+        line = follow(source, files, contents, LoadOptions(topics=requested), None if check else progress)
+        stamped = _first_messages(files)
         damage = _all_damage(files, progress) if check else [note for one in contents for note in one.damage]
     starts = [one.start_ns for one in contents if one.start_ns is not None]
     ends = [one.end_ns for one in contents if one.end_ns is not None]
@@ -114,10 +136,8 @@ def overview(
         min(starts, default=None),
         max(ends, default=None),
         _flows(timed, min(starts, default=0), stamped),
-        choices,
-        tuple(map(str, (*source.damage, *damage))),
-        tuple(_clocks(choices, stamped)),
-        frames,
+        line,
+        tuple(dict.fromkeys((*map(str, (*source.damage, *damage)), *line.lost))),
     )
 
 
@@ -165,38 +185,8 @@ def _offset_s(stamped: Stamped) -> float | None:
     return float(np.median(offset_ns) / NS_PER_S)
 
 
-def _clocks(choices: Mapping[str, Choice], stamped: Mapping[str, Stamped]) -> list[str]:
-    """What is unusual about the clocks of the topics that an extraction would take."""
-    names = {role: [topic.name for topic in choice.topics] for role, choice in choices.items() if choice.topics}
-    reference = next((name for role in _CLOCKS for name in names.get(role, ())), "")
-    if reference not in stamped:
-        return []
-    clock = Clock(stamped[reference])
-    notes = []
-    if clock.simulated:
-        begins_s = (int(stamped[reference].log_ns[0]) + clock.offset_ns) / NS_PER_S
-        notes.append(
-            f"header stamps are simulated time, or time since the computer's start: {reference} begins at "
-            f"{begins_s:.2f} s"
-        )
-    elif abs(clock.offset_ns) > APART_S * NS_PER_S:
-        differ_s = clock.offset_ns / NS_PER_S
-        notes.append(f"header stamps of {reference} differ by {differ_s:+.3f} s from the recorder's clock")
-    if notes:
-        notes[0] += "; extract goes by the stamps, unless `time` log"
-    for role in ("wrench", "people"):
-        for name in names.get(role, ()):
-            if name in stamped and name != reference:
-                clock.times(stamped[name])
-    return [*notes, *(f"in the first messages: {note}" for note in clock.notes)]
-
-
-def _first_messages(files: Sequence[RawFile]) -> tuple[dict[str, Stamped], str]:
-    """What the messages of the first chunks of a recording show.
-
-    Returns:
-        Stamps by topic, of transforms those of each message's first; and how the frames connect, empty without tf.
-    """
+def _first_messages(files: Sequence[RawFile]) -> dict[str, Stamped]:
+    """Stamps by topic in the first chunks of a recording, of transforms those of each message's first."""
     decoders: dict[Channel, Decoder | None] = {}
     parts: dict[str, list[DecodedBatch]] = {}
 
@@ -215,21 +205,12 @@ def _first_messages(files: Sequence[RawFile]) -> tuple[dict[str, Stamped], str]:
                 part = decoder.decode(batch)
                 if len(part.order):
                     parts.setdefault(batch.channel.topic, []).append(part)
-    static: list[Link] = []
-    moving: list[Link] = []
-    for topic, some in parts.items():
-        if _TF_STAMP in some[0].columns:
-            (static if topic.endswith("tf_static") else moving).extend(
-                link for part in some for link in links_of(part.columns, part.counts[_TRANSFORMS])
-            )
-    stamped = {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
-    return stamped, TransformTree(static, moving).describe() if static or moving else ""
+    return {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
 
 
 def _decoder(channel: Channel) -> Decoder | None:
-    """A decoder of a channel's stamps, or of all of its transforms; None where it has none or cannot be decoded."""
-    tf = full_name(channel.schema_name) == message_types.TF.name
-    paths = tuple(message_types.TF.fields.values()) if tf else (_STAMP,)
+    """A decoder of a channel's stamps, or of those of its transforms; None where it has none or cannot be decoded."""
+    paths = (_TF_STAMP if full_name(channel.schema_name) == message_types.TF.name else _STAMP,)
     try:
         schema = parse_definition(
             channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding

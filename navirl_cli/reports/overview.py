@@ -24,7 +24,7 @@ _ROLE = (Column("role"), Column("topic"), Column("reason"))
 
 def overview_report(view: Overview) -> list[Block]:
     """A recording: name, size, time, topics, and the role of each topic."""
-    lines = [_duration(view), *(f"clock: {line}" for line in view.clocks)]
+    lines = [_duration(view), *view.findings]
     lines += [f"frames: {view.frames}"] if view.frames else []
     flows = tuple(_flow(flow, view.reference_s) for flow in view.flows)
     roles = tuple(
@@ -51,11 +51,14 @@ def _flow(flow: Flow, reference_s: float) -> tuple[Cell, ...]:
 
 
 def _verdict(view: Overview) -> list[Block]:
-    """Whether the log has what extract needs, and the missing roles, those that are needed first."""
+    """Whether extract can use the log, why not, and the missing roles, those that are needed first."""
     missing = {name: choice.problem for name, choice in view.choices.items() if not choice.topics}
     order = sorted(missing, key=lambda name: name not in view.needed)
-    needed = f"extract needs: {', '.join(view.needed)}" if view.needed else "extract has what it needs"
-    return [Heading(needed), Bullets(tuple(missing[name] for name in order))]
+    if view.needed:
+        verdict = f"extract needs: {', '.join(view.needed)}"
+    else:
+        verdict = "extract refuses this log" if view.refusals else "extract has what it needs"
+    return [Heading(verdict), Bullets((*view.refusals, *(missing[name] for name in order)))]
 
 
 def _name(view: Overview) -> str:
@@ -108,9 +111,10 @@ def overview_document(view: Overview) -> dict[str, Any]:
             }
             for name, choice in view.choices.items()
         },
-        "clocks": list(view.clocks),
+        "findings": list(view.findings),
         "frames": view.frames or None,
         "needed": list(view.needed),
+        "refusals": list(view.refusals),
         "notes": list(view.source.notes),
         "damage": list(view.damage),
     }

@@ -124,6 +124,7 @@ def read(
     sizes = [_size(path) for path in files]
     builders = {topic: SeriesBuilder(topic, topic in latest) for topic in wants}
     damage: list[Damage] = []
+    begin = 0
     for number, path in enumerate(files):
 
         def report(share: float, done: int = sum(sizes[:number]), size: int = sizes[number]) -> None:
@@ -132,7 +133,10 @@ def read(
 
         batches, found = _read_file(path, wants, builders, report, threads or threads_here())
         for topic, some in batches.items():
-            builders[topic].add(some)
+            builders[topic].add(some, begin)
+        begin += 1 + max(
+            (int(one.order.max()) for some in batches.values() for one in some if len(one.order)), default=0
+        )
         damage += found
         report(1.0)
     series = {topic: builder.series() for topic, builder in builders.items() if builder.decoders}

@@ -21,6 +21,9 @@ class Series:
     schema_name: str
     #: Time of receipt in ns, shape (n,).
     log_time_ns: IntArray
+    #: Place of each message in the order of the files and in the file, shape (n,): of two messages of a recording, on
+    #: whatever topics, the one with the smaller place was written first. Different rows have different places.
+    order: IntArray
     #: By wanted field: numbers of the field's own type, shape (n,), or (n, k) for a fixed array of k; times as int64
     #: ns; texts as an object array of str. A field in a sequence, "poses[].position.x", holds the entries of all
     #: messages one after the other, shape (total,).
@@ -42,8 +45,8 @@ class SeriesBuilder:
     schema_name: str = ""
     #: By channel; channels of several files with the same definition are one.
     decoders: dict[Channel, Decoder] = field(default_factory=dict)
-    #: By file.
-    files: list[list[DecodedBatch]] = field(default_factory=list)
+    #: By file: where its messages begin in the order of all files, and its batches.
+    files: list[tuple[int, list[DecodedBatch]]] = field(default_factory=list)
 
     def add_channel(self, channel: Channel, paths: tuple[str, ...]) -> str:
         """Make the channel's decoder; return the reason why it cannot be decoded, or ""."""
@@ -69,20 +72,22 @@ class SeriesBuilder:
         self.decoders[channel] = Decoder(schema, paths)
         return ""
 
-    def add(self, batches: list[DecodedBatch]) -> None:
-        """Add the batches of a file."""
-        self.files.append(batches)
+    def add(self, batches: list[DecodedBatch], begin: int) -> None:
+        """Add the batches of a file, whose messages begin at this place of the order of all files."""
+        self.files.append((begin, batches))
         if self.latest:
-            filled = [batch for file in self.files for batch in file if len(batch.order)]
-            self.files = [[max(filled, key=lambda batch: int(batch.log_time_ns.max()))] if filled else []]
+            filled = [(start, batch) for start, file in self.files for batch in file if len(batch.order)]
+            newest = [max(filled, key=lambda one: int(one[1].log_time_ns.max()))] if filled else []
+            self.files = [(start, [batch]) for start, batch in newest]
 
     def series(self) -> Series:
         """The series; the batches are consumed."""
         # a batch without messages may have other types of columns
-        numbered = [(number, batch) for number, file in enumerate(self.files) for batch in file if len(batch.order)]
-        numbers, batches = [number for number, _ in numbered], [batch for _, batch in numbered]
+        filled = [(begin, batch) for begin, file in self.files for batch in file if len(batch.order)]
+        batches = [batch for _, batch in filled]
         times = _joined([batch.log_time_ns for batch in batches])
-        rows = self._rows(batches, numbers, times)
+        order = _joined([begin + batch.order for begin, batch in filled])
+        rows = self._rows(times, order)
         if self.latest and len(times):
             rows = np.arange(len(times))[-1:] if rows is None else rows[-1:]
         leaves = next(iter(self.decoders.values())).leaves
@@ -96,16 +101,15 @@ class SeriesBuilder:
                 column = column[rows if leaf.sequence is None else _entries(counts[leaf.sequence], rows)]
             columns[path] = column
         if rows is not None:
-            times, counts = times[rows], {sequence: count[rows] for sequence, count in counts.items()}
+            times, order = times[rows], order[rows]
+            counts = {sequence: count[rows] for sequence, count in counts.items()}
         self.files.clear()
-        return Series(self.topic, self.schema_name, times, columns, counts)
+        return Series(self.topic, self.schema_name, times, order, columns, counts)
 
-    def _rows(self, batches: list[DecodedBatch], numbers: list[int], times: IntArray) -> IntArray | None:
+    def _rows(self, times: IntArray, order: IntArray) -> IntArray | None:
         """The order by time, then by file, then in the file; None if the batches are already in this order."""
         if len(self.decoders) > 1:
-            files = _joined([np.full(len(batch.order), k) for k, batch in zip(numbers, batches, strict=True)])
-            orders = _joined([batch.order for batch in batches])
-            return np.lexsort((orders, files, times))
+            return np.lexsort((order, times))
         return np.argsort(times, kind="stable") if (np.diff(times) < 0).any() else None
 
 

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.logs.findings import Finding, Kind
 
 NS_PER_S = 1_000_000_000
 #: A clock that moves by more than this against the recorder's between two messages has jumped, s.
@@ -64,8 +65,8 @@ class Clock:
 
     reference: Stamped
     source: TimeSource = TimeSource.HEADER
-    #: What is unusual about the stamps, in words.
-    notes: list[str] = field(default_factory=list)
+    #: What is unusual about the stamps.
+    findings: list[Finding] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Track the reference's offset from the recorder's clock over time."""
@@ -75,7 +76,7 @@ class Clock:
         if self.source is TimeSource.HEADER and not stamped.size:
             self.source = TimeSource.LOG
             if len(log_ns):
-                self.notes.append(f"no message on {self.reference.topic} has a stamp; times of receipt are used")
+                self.findings.append(Finding(Kind.NO_STAMPS, self.reference.topic))
         #: Offset at the first stamp, ns. Later offsets are relative to it, so that floats hold them.
         self._base_ns = 0
         self._shifts_ns = np.zeros(1, dtype=np.int64)
@@ -106,7 +107,7 @@ class Clock:
             return expected
         stamped = one.stamp_ns != 0
         if not stamped.all():
-            self._note(one, int((~stamped).sum()), "are stamped 0")
+            self.findings.append(Finding(Kind.UNSTAMPED, one.topic, int((~stamped).sum())))
         times = np.where(stamped, self.shifted(one.stamp_ns, one.log_ns), expected)
         if one.topic != self.reference.topic:
             times = times - np.where(stamped, self._apart(one, _seconds(times - expected), stamped), 0)
@@ -115,7 +116,7 @@ class Clock:
         if self._at_ns[0] == self._at_ns[-1]:  # some converters give all messages one time of receipt
             wild[:] = False
         if wild.any() and (one.momentary or len(times) >= _MIN_MESSAGES):
-            self._note(one, int(wild.sum()), f"have stamps more than {JUMP_S:g} s off their clock")
+            self.findings.append(Finding(Kind.WILD_STAMPS, one.topic, int(wild.sum()), JUMP_S))
             times = np.where(wild, expected, times)
         return times
 
@@ -141,10 +142,8 @@ class Clock:
         self._offset_s = _smooth(steady - jumped, _seconds(log_ns - log_ns[0]))
         for row in jumps.tolist():
             at_s = (int(log_ns[row]) - int(log_ns[0])) / NS_PER_S
-            self.notes.append(
-                f"the clock jumps by {jumped[row + 1] - jumped[row]:+.2f} s {at_s:.1f} s after the start; later "
-                "times were shifted to continue"
-            )
+            size = float(jumped[row + 1] - jumped[row])
+            self.findings.append(Finding(Kind.CLOCK_STEP, "the clock", size=size, at_s=at_s))
 
     def _expected(self, log_ns: IntArray) -> IntArray:
         """The clock's time when messages are received, (n,) ns."""
@@ -169,37 +168,11 @@ class Clock:
         middle, change = float(np.median(steady)), float(steady[-1] - steady[0])
         if abs(middle) <= APART_S and abs(change) <= _DRIFT_S:
             return none
-        drifts = f", changing by {change:+.2f} s until the end" if abs(change) > _DRIFT_S else ""
-        self.notes.append(
-            f"{one.topic} is stamped by another clock than {self.reference.topic}: {middle:+.3f} s by the times of "
-            f"receipt{drifts}; aligned"
-        )
+        kind = Kind.DRIFTING_CLOCK if abs(change) > _DRIFT_S else Kind.OTHER_CLOCK
+        than = self.reference.topic
+        self.findings.append(Finding(kind, one.topic, size=middle, change=change, detail=than))
         apart = np.interp(at_s, at_s[rows], steady) if np.ptp(steady) > _CONSTANT_S else np.full(len(away_s), middle)
         return np.round(apart * NS_PER_S).astype(np.int64)
-
-    def _note(self, one: Stamped, count: int, problem: str) -> None:
-        self.notes.append(f"{count} messages on {one.topic} {problem}; their times of receipt are used")
-
-
-def in_order(topic: str, times_ns: IntArray) -> tuple[IntArray, list[str]]:
-    """Rows in order of time, of equal times the first.
-
-    Args:
-        topic: Its name, for notes.
-        times_ns: (n,) ns in order of receipt.
-
-    Returns:
-        (m,) rows, and notes on messages out of order or repeated.
-    """
-    notes = []
-    _, rows = np.unique(times_ns, return_index=True)
-    late = int((np.diff(times_ns) < 0).sum())
-    twice = len(times_ns) - len(rows)
-    if late:
-        notes.append(f"{late} messages on {topic} were received out of order; sorted by time")
-    if twice:
-        notes.append(f"{twice} messages on {topic} repeat the time of another; the first counts")
-    return rows, notes
 
 
 def _seconds(ns: IntArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """The messages of one topic as columns, by the names that navirl uses whatever the message type is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.logs.messages.series import Series
-from navirl_cli.logs.roles.clocks import Clock, Stamped
+from navirl_cli.logs.roles.clocks import Stamped
 from navirl_cli.logs.roles.message_types import MessageType
 
 
@@ -19,15 +19,17 @@ class Columns:
 
     topic: str
     message_type: MessageType
-    #: (n,) ns of receipt, ascending.
-    log_time_ns: IntArray
+    #: (n,) ns: of receipt, ascending, as it was read; on the recording's clock after the stage of time.
+    t_ns: IntArray
+    #: (n,) place in the order in which the recorder wrote; comparable with that of other topics.
+    order: IntArray
     #: By field of the role: (n,) for fields of messages, (total,) for fields of entries.
     by_field: Mapping[str, NDArray[Any]]
     #: (n,) entries of each message; None for a type without entries.
     counts: IntArray | None
 
     def __len__(self) -> int:
-        return len(self.log_time_ns)
+        return len(self.t_ns)
 
     def __contains__(self, name: str) -> bool:
         return name in self.by_field
@@ -40,7 +42,7 @@ class Columns:
         """The columns of a topic that was read with the fields of a message type."""
         by_field = {name: series.columns[path] for name, path in message_type.fields.items()}
         counts = None if message_type.sequence is None else series.counts[message_type.sequence]
-        return Columns(series.topic, message_type, series.log_time_ns, by_field, counts)
+        return Columns(series.topic, message_type, series.log_time_ns, series.order, by_field, counts)
 
     @property
     def owner_counts(self) -> IntArray:
@@ -69,7 +71,7 @@ class Columns:
     def rows(self, kept: NDArray[Any]) -> "Columns":
         """Some of the messages, of a type without entries."""
         by_field = {name: column[kept] for name, column in self.by_field.items()}
-        return Columns(self.topic, self.message_type, self.log_time_ns[kept], by_field, None)
+        return Columns(self.topic, self.message_type, self.t_ns[kept], self.order[kept], by_field, None)
 
     def last_entries(self) -> "Columns":
         """The last entry of each message that has some, as messages without entries."""
@@ -79,7 +81,11 @@ class Columns:
         by_field = {
             name: column[last if self.message_type.of_entries(name) else some] for name, column in self.by_field.items()
         }
-        return Columns(self.topic, self.message_type, self.log_time_ns[some], by_field, None)
+        return Columns(self.topic, self.message_type, self.t_ns[some], self.order[some], by_field, None)
+
+    def at(self, t_ns: IntArray, **fields: NDArray[Any]) -> "Columns":
+        """The same messages at other times, (n,) ns, and with some fields in place of their own."""
+        return replace(self, t_ns=t_ns, by_field={**self.by_field, **fields})
 
     def stamped(self, *, momentary: bool = False) -> Stamped:
         """The messages' stamps; of entries with their own stamps the latest, since some may have none."""
@@ -91,8 +97,4 @@ class Columns:
                 some = self.counts > 0
                 latest[some] = np.maximum.reduceat(stamps, first[some])
             stamps = latest
-        return Stamped(self.topic, self.log_time_ns, stamps, momentary)
-
-    def times(self, clock: Clock, *, momentary: bool = False) -> IntArray:
-        """(n,) ns on the recording's clock."""
-        return clock.times(self.stamped(momentary=momentary))
+        return Stamped(self.topic, self.t_ns, stamps, momentary)

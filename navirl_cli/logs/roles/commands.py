@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.logs.roles.clocks import Clock
 from navirl_cli.logs.roles.columns import Columns
 
 #: An axis of a joystick this near to 0 is at rest there, if it is so in this share of the messages.
 _STICK_REST, _RESTS = 0.05, 0.05
 
 
-def commands_of(topics: Sequence[Columns], clock: Clock) -> tuple[IntArray, FloatArray]:
+def commands_of(topics: Sequence[Columns]) -> tuple[IntArray, FloatArray]:
     """(c,) ns and (c,) how far the joystick is from where its axes rest: a stick at 0, a pad's triggers at 1."""
     times = [np.zeros(0, dtype=np.int64)]
     away = [np.zeros(0)]
@@ -25,7 +24,7 @@ def commands_of(topics: Sequence[Columns], clock: Clock) -> tuple[IntArray, Floa
             back = (near & np.logical_or.accumulate(~near, axis=0)).mean(axis=0) > _RESTS
             rest = np.where(back, 0.0, np.median(axes, axis=0))
         away.append(np.abs(axes - rest).max(axis=1))
-        times.append(columns.times(clock, momentary=True))
+        times.append(columns.t_ns)
     t_ns = np.concatenate(times)
     order = np.argsort(t_ns, kind="stable")
     return t_ns[order], np.concatenate(away)[order]

@@ -1,7 +1,7 @@
-"""The one clock and the one frame that everything in a recording is brought onto."""
+"""The one frame that everything in a recording is brought into, and what every role asks of it."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError
-from navirl_cli.logs.roles.clocks import Clock, in_order
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.plausible import PLACES, Limits, plausible_messages
 from navirl_cli.logs.tf.tree import TransformTree
@@ -18,58 +18,19 @@ from navirl_cli.logs.tf.tree import TransformTree
 _BASES: Final = ("base_footprint", "base_link", "base")
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Context:
-    """Clock, frames, and what was found about them."""
+    """The frames of a recording."""
 
-    #: Name of the recording, which begins every note.
+    #: Name of the recording, which begins every error.
     log: str
-    clock: Clock
     tree: TransformTree
     #: The frame that everything is expressed in.
     fixed: str
-    #: What is unusual, in words.
-    notes: list[str] = field(default_factory=list)
-    #: What was lost, in words.
-    lost: list[str] = field(default_factory=list)
-
-    def note(self, text: str) -> None:
-        """Note something unusual."""
-        self.notes.append(f"{self.log}: {text}")
-
-    def lose(self, text: str) -> None:
-        """Note a loss."""
-        self.lost.append(f"{self.log}: {text}")
 
     def is_fixed(self, frame: str) -> bool:
         """Whether a frame is the fixed one."""
         return frame.lstrip("/") == self.fixed.lstrip("/")
-
-    def plausible(self, columns: Columns, limits: Limits, *names: str, rotations: BoolArray | None = None) -> Columns:
-        """The messages whose measurements are plausible; the others are noted as lost."""
-        good, problem = plausible_messages(columns.topic, columns.stacked(*names), limits, rotations)
-        if not problem:
-            return columns
-        self.lose(problem)
-        return columns.rows(good)
-
-    def in_one_frame(self, columns: Columns) -> tuple[Columns, str]:
-        """The messages in the most common of their frames, and that frame; the others are noted as lost."""
-        frames = columns.frames()
-        (frame, count), *_ = Counter(frames.tolist()).most_common(1) or [("", 0)]
-        if count == len(columns):
-            return columns, frame
-        others = len(columns) - count
-        self.lose(f"{others} messages on {columns.topic} are not in frame {frame!r}, as the others are; left out")
-        return columns.rows(frames == frame), frame
-
-    def ordered_times(self, columns: Columns) -> tuple[IntArray, IntArray]:
-        """(n,) ns on the recording's clock, and the rows in order of time, which are noted where they were not."""
-        t_ns = columns.times(self.clock)
-        rows, notes = in_order(columns.topic, t_ns)
-        for text in notes:
-            self.note(text)
-        return t_ns, rows
 
     def placed(self, points_m: FloatArray, frames: NDArray[np.object_], t_ns: IntArray) -> tuple[FloatArray, str]:
         """Points in the fixed frame.
@@ -101,14 +62,30 @@ class Context:
         placed[far] = np.nan
         return placed, problem
 
-    def base_frame(self, named: str) -> str:
+    def base_frame(self, named: str) -> tuple[str, Findings]:
         """The robot's own frame: the one that a message names, else the usual one that tf knows."""
         if named:
-            return named
+            return named, ()
         for name in _BASES:
             if name in self.tree.frames:
-                return name
+                return name, ()
         # a wrench that is given in it needs no transform
-        bases = ", ".join(_BASES)
-        self.note(f"no message names the robot's own frame, and tf knows none of {bases}; base_link is assumed")
-        return "base_link"
+        return "base_link", (Finding(Kind.BASE_ASSUMED, "base_link", detail=", ".join(_BASES)),)
+
+
+def plausible(
+    columns: Columns, limits: Limits, *names: str, rotations: BoolArray | None = None
+) -> tuple[Columns, Findings]:
+    """The messages whose measurements are plausible; the others are a loss."""
+    good, findings = plausible_messages(columns.topic, columns.stacked(*names), limits, rotations)
+    return (columns.rows(good), findings) if findings else (columns, ())
+
+
+def in_one_frame(columns: Columns) -> tuple[Columns, str, Findings]:
+    """The messages in the most common of their frames, and that frame; the others are a loss."""
+    frames = columns.frames()
+    (frame, count), *_ = Counter(frames.tolist()).most_common(1) or [("", 0)]
+    if count == len(columns):
+        return columns, frame, ()
+    lost = Finding(Kind.OTHER_FRAME, columns.topic, len(columns) - count, detail=frame)
+    return columns.rows(frames == frame), frame, (lost,)

@@ -6,57 +6,60 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Track
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
 
 
-def people_of(topics: Sequence[Columns], context: Context) -> tuple[IntArray, tuple[Track, ...]]:
+def people_of(topics: Sequence[Columns], context: Context) -> tuple[IntArray, tuple[Track, ...], Findings]:
     """The tracks of all people.
 
     Args:
         topics: One that lists people, or several about one person each.
-        context: Clock and frames.
+        context: The frames.
 
     Returns:
-        (m,) ns of every message, ascending, and the tracks. A person without a name is named by the place in the
-        message, or by the topic.
+        (m,) ns of every message, ascending, the tracks, and what was found out. A person without a name is named by
+        the place in the message, or by the topic.
     """
     times: list[IntArray] = []
     tracks: list[Track] = []
+    findings: list[Finding] = []
     for columns in topics:
-        t_ns = columns.times(context.clock)
+        t_ns, owner = columns.t_ns, columns.owner
         times.append(t_ns)
-        owner = columns.owner
-        xy, kept = _placed(columns, context, t_ns[owner], _counted(columns))
+        xy, kept, lost = _placed(columns, context, t_ns[owner], _counted(columns))
+        findings += lost
         names = _names(columns, columns.topic if len(topics) > 1 else "1")[kept]
         tracks += _tracks(names, t_ns[owner][kept], xy[kept])
-    return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *times])), tuple(tracks)
+    return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *times])), tuple(tracks), tuple(findings)
 
 
-def goals_of(columns: Columns | None, context: Context) -> tuple[IntArray, FloatArray]:
-    """(g,) ns and (g, 2) m of the goals announced; a plan's goal is its end."""
+def goals_of(columns: Columns | None, context: Context) -> tuple[IntArray, FloatArray, Findings]:
+    """(g,) ns and (g, 2) m of the goals announced, and what was found out; a plan's goal is its end."""
     if columns is None or len(columns) == 0:
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
-    t_ns = columns.times(context.clock, momentary=True)
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 2)), ()
     if columns.counts is not None:
-        t_ns = t_ns[columns.counts > 0]
         columns = columns.last_entries()
-    xy, good = _placed(columns, context, t_ns, np.ones(len(t_ns), dtype=np.bool_))
+    t_ns = columns.t_ns
+    xy, good, lost = _placed(columns, context, t_ns, np.ones(len(t_ns), dtype=np.bool_))
     order = np.argsort(t_ns[good], kind="stable")
-    return t_ns[good][order], xy[good][order]
+    return t_ns[good][order], xy[good][order], lost
 
 
-def _placed(columns: Columns, context: Context, t_ns: IntArray, wanted: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """(total, 2) m of the wanted entries in the fixed frame, and (total,) which of them can be placed."""
+def _placed(
+    columns: Columns, context: Context, t_ns: IntArray, wanted: BoolArray
+) -> tuple[FloatArray, BoolArray, Findings]:
+    """(total, 2) m of the wanted entries in the fixed frame, (total,) which can be placed, and a loss of the others."""
     xy = np.full((len(wanted), 2), np.nan)
     points_m, frames = columns.stacked("px", "py", "pz"), columns.frames()
     xy[wanted], problem = context.placed(points_m[wanted], frames[wanted], t_ns[wanted])
     good: BoolArray = np.array(np.isfinite(xy).all(axis=1))
-    if problem:
-        entries = "messages" if columns.counts is None else "places"
-        context.lose(f"{int((wanted & ~good).sum())} {entries} on {columns.topic} left out: {problem}")
-    return xy, good
+    if not problem:
+        return xy, good, ()
+    kind = Kind.UNPLACED_MESSAGES if columns.counts is None else Kind.UNPLACED_ENTRIES
+    return xy, good, (Finding(kind, columns.topic, int((wanted & ~good).sum()), detail=problem),)
 
 
 def _counted(columns: Columns) -> BoolArray:

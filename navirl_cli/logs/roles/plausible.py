@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray
+from navirl_cli.logs.findings import Finding, Findings, Kind
 
 #: Measurements judged at once: memory never holds a copy of all of them.
 _BLOCK: Final = 1 << 15
@@ -32,7 +33,7 @@ PLACES: Final = Limits(1e6, 1.0, "m")
 
 def plausible_messages(
     topic: str, values: FloatArray, limits: Limits, rotations: BoolArray | None = None
-) -> tuple[BoolArray, str]:
+) -> tuple[BoolArray, Findings]:
     """Which messages of a topic are plausible, and what is wrong with the others.
 
     Args:
@@ -43,8 +44,8 @@ def plausible_messages(
 
     Returns:
         (n,) False where one of the k is not finite, larger than possible, a single spike, or the result of a flipped
-        exponent (nearly 0 between neighbours that are not), or where the rotation is none; and a sentence about those
-        messages, empty where all are plausible.
+        exponent (nearly 0 between neighbours that are not), or where the rotation is none; and a finding about those
+        messages, if there are any.
     """
     impossible = _impossible(values, limits)
     good: BoolArray = np.array(~impossible.any(axis=1))
@@ -60,11 +61,8 @@ def plausible_messages(
         found[f"impossible, such as {example:.3g} {limits.unit}"] = absurd
     counts = [f"{int(rows.sum())} {what}" for what, rows in found.items() if rows.any()]
     if good.all():
-        return good, ""
-    return (
-        good,
-        f"{int((~good).sum())} messages on {topic} hold implausible values ({', '.join(counts)}); left out",
-    )
+        return good, ()
+    return good, (Finding(Kind.IMPLAUSIBLE, topic, int((~good).sum()), detail=", ".join(counts)),)
 
 
 def _impossible(values: FloatArray, limits: Limits) -> BoolArray:

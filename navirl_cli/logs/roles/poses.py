@@ -7,11 +7,13 @@ import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError, LogError
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Jump
 from navirl_cli.logs.roles.clocks import NS_PER_S
 from navirl_cli.logs.roles.columns import Columns
-from navirl_cli.logs.roles.context import Context
+from navirl_cli.logs.roles.context import Context, in_one_frame, plausible
 from navirl_cli.logs.roles.plausible import PLACES
+from navirl_cli.logs.roles.times import without_repeats
 from navirl_cli.logs.tf.rotations import are_rotations, normalised
 from navirl_cli.logs.tf.transforms import Transforms
 
@@ -44,12 +46,12 @@ class Poses:
     base: str
 
 
-def poses_of(columns: Columns | None, context: Context) -> Poses:
+def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings]:
     """Bring the robot's poses into the fixed frame.
 
     Args:
-        columns: Messages with poses; None to take them from tf.
-        context: Clock and frames.
+        columns: Messages with poses, in order of time; None to take them from tf.
+        context: The frames.
 
     Raises:
         FrameError: tf does not connect the frames, or covers none of the poses' times.
@@ -57,16 +59,16 @@ def poses_of(columns: Columns | None, context: Context) -> Poses:
     """
     if columns is None:
         return _from_tf(context)
-    columns, frame = context.in_one_frame(columns)
+    columns, frame, others = in_one_frame(columns)
     rotations = are_rotations(columns.stacked(*_ROTATION))
-    columns = context.plausible(columns, PLACES, *_POSITION, rotations=rotations)
+    columns, implausible = plausible(columns, PLACES, *_POSITION, rotations=rotations)
     if len(columns) == 0:
         raise LogError(f"{context.log}: topic {columns.topic}: expected poses, found none that are finite")
-    stamps, rows = context.ordered_times(columns)
-    base = context.base_frame(str(columns["child"][0]) if "child" in columns else "")
-    rows = rows[_covered(columns.topic, base, stamps[rows], frame, context)]
-    t_ns = stamps[rows]
+    columns, repeated = without_repeats(columns)
+    base, assumed = context.base_frame(str(columns["child"][0]) if "child" in columns else "")
+    rows, uncovered = _covered(columns.topic, base, columns.t_ns, frame, context)
     columns = columns.rows(rows)
+    t_ns = columns.t_ns
     poses = Transforms(normalised(columns.stacked(*_ROTATION)), columns.stacked(*_POSITION))
     into = context.tree.lookup(context.fixed, frame, t_ns)
     placed = into.after(poses)
@@ -80,12 +82,13 @@ def poses_of(columns: Columns | None, context: Context) -> Poses:
     velocity = columns.stacked("vx", "vy") if "vx" in columns else None
     if velocity is not None and not (np.isfinite(velocity).all() and velocity.any()):
         velocity = None
-    return Poses(t_ns, placed.translation_m[:, :2], placed.yaw_rad, velocity, jumps, base)
+    found = (*others, *implausible, *repeated, *assumed, *uncovered)
+    return Poses(t_ns, placed.translation_m[:, :2], placed.yaw_rad, velocity, jumps, base), found
 
 
-def _from_tf(context: Context) -> Poses:
+def _from_tf(context: Context) -> tuple[Poses, Findings]:
     """The poses at which tf itself was stamped."""
-    base = context.base_frame("")
+    base, assumed = context.base_frame("")
     try:
         t_ns = context.tree.stamps(context.fixed, base)
     except FrameError as error:
@@ -97,45 +100,48 @@ def _from_tf(context: Context) -> Poses:
             f"{context.log}: no odometry, and in tf {base!r} does not move on {context.fixed!r}; record the robot's "
             "odometry"
         )
-    t_ns = t_ns[~_in_gaps(base, t_ns, context)]
+    inside, lost = _in_gaps(base, t_ns, context)
+    t_ns = t_ns[~inside]
     placed = context.tree.lookup(context.fixed, base, t_ns)
     xy = placed.translation_m[:, :2]
-    context.note(f"no odometry: poses are those of {base!r} in tf")
-    return Poses(t_ns, xy, placed.yaw_rad, None, _leaps(t_ns, xy), base)
+    found = (*assumed, *lost, Finding(Kind.POSES_FROM_TF, base))
+    return Poses(t_ns, xy, placed.yaw_rad, None, _leaps(t_ns, xy), base), found
 
 
-def _covered(topic: str, base: str, t_ns: IntArray, frame: str, context: Context) -> IntArray:
-    """Rows at which tf places a frame; the others are noted."""
+def _covered(topic: str, base: str, t_ns: IntArray, frame: str, context: Context) -> tuple[IntArray, Findings]:
+    """Rows at which tf places a frame, and what was found out about the others."""
     if context.is_fixed(frame):
-        return np.arange(len(t_ns))
+        return np.arange(len(t_ns)), ()
     tree, fixed = context.tree, context.fixed
     try:
         span = tree.span(fixed, frame)
     except FrameError as error:
         raise FrameError(f"{context.log}: {topic} places {base!r} in frame {frame!r}: {error}") from error
     if span is None:
-        return np.arange(len(t_ns))
+        return np.arange(len(t_ns)), ()
     covered = (t_ns >= span[0] - _HOLD_NS) & (t_ns <= span[1] + _HOLD_NS)
     if not covered.any():
         raise FrameError(
             f"{context.log}: the transform from {frame!r} to {fixed!r} is known at no time of {topic}; check that tf "
             "and odometry are stamped by the same clock, or try `time` log"
         )
+    findings = []
     if not covered.all():
-        context.note(f"{int((~covered).sum())} poses lie outside the time that tf covers; left out")
+        findings.append(Finding(Kind.UNCOVERED_POSES, frame, int((~covered).sum())))
     rows = np.flatnonzero(covered)
-    rows = rows[~_in_gaps(frame, t_ns[rows], context)]
+    inside, lost = _in_gaps(frame, t_ns[rows], context)
+    rows = rows[~inside]
     for child, parents in tree.several_parents(fixed, frame, t_ns[rows]).items():
-        context.note(f"tf gives {child!r} several parents in turn: {', '.join(parents)}")
-    return rows
+        findings.append(Finding(Kind.SEVERAL_PARENTS, child, detail=", ".join(parents)))
+    return rows, (*findings, *lost)
 
 
-def _in_gaps(frame: str, t_ns: IntArray, context: Context) -> BoolArray:
-    """(n,) which times lie in gaps of tf that are too long, which are noted as lost."""
+def _in_gaps(frame: str, t_ns: IntArray, context: Context) -> tuple[BoolArray, Findings]:
+    """(n,) which times lie in gaps of tf that are too long, and their loss."""
     inside: BoolArray = context.tree.largest_gap_ns(context.fixed, frame, t_ns) > GAP_NS
-    if inside.any():
-        context.lose(f"{int(inside.sum())} poses lie in gaps of tf longer than {GAP_NS / NS_PER_S:g} s; left out")
-    return inside
+    if not inside.any():
+        return inside, ()
+    return inside, (Finding(Kind.POSES_IN_GAPS, frame, int(inside.sum()), GAP_NS / NS_PER_S),)
 
 
 def _corrections(t_ns: IntArray, moved_m: FloatArray) -> tuple[Jump, ...]:

@@ -5,20 +5,22 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.errors import FrameError, LogError
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Wrench
 from navirl_cli.logs.roles.columns import Columns
-from navirl_cli.logs.roles.context import Context
+from navirl_cli.logs.roles.context import Context, in_one_frame, plausible
 from navirl_cli.logs.roles.plausible import FORCES
+from navirl_cli.logs.roles.times import without_repeats
 
 _FORCE: Final = ("fx", "fy", "fz")
 
 
-def wrench_of(columns: Columns, context: Context, base: str, named: str | None) -> Wrench:
+def wrench_of(columns: Columns, context: Context, base: str, named: str | None) -> tuple[Wrench, Findings]:
     """Forces in the sensor's frame, and the rotation of that frame.
 
     Args:
-        columns: Messages with forces.
-        context: Clock and frames.
+        columns: Messages with forces, in order of time.
+        context: The frames.
         base: The robot's own frame.
         named: The frame of the forces where the user names it, in place of the messages'.
 
@@ -26,19 +28,21 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         FrameError: tf does not connect the frames.
         LogError: No force is plausible.
     """
-    columns, own = context.in_one_frame(columns)
-    columns = context.plausible(columns, FORCES, *_FORCE)
+    columns, own, others = in_one_frame(columns)
+    columns, implausible = plausible(columns, FORCES, *_FORCE)
     if len(columns) == 0:
         raise LogError(f"{context.log}: topic {columns.topic}: expected forces, found none that are finite")
+    columns, repeated = without_repeats(columns)
+    findings = [*others, *implausible, *repeated]
     frame = named or own
     if not frame:
-        context.note(f"{columns.topic} names no frame; {base!r} is assumed; name another with `wrench_frame`")
+        findings.append(Finding(Kind.NO_WRENCH_FRAME, columns.topic, detail=base))
         frame = base
-    stamps, rows = context.ordered_times(columns)
-    t_ns, force = stamps[rows], columns.stacked(*_FORCE)[rows]
+    t_ns, force = columns.t_ns, columns.stacked(*_FORCE)
     try:
-        span = context.tree.span(base, frame)
-        mounted = context.tree.lookup(base, frame, t_ns[:1] if span is None else np.clip(t_ns, *span))
+        span, constant = context.tree.span(base, frame), context.tree.is_constant(base, frame)
+        times = t_ns if span is None else np.clip(t_ns, *span)
+        mounted = context.tree.lookup(base, frame, times[:1] if constant else times)
     except FrameError as error:
         raise FrameError(
             f"{context.log}: the wrench is given in frame {frame!r}: {error}; or name a frame with "
@@ -46,5 +50,5 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         ) from error
     turns = mounted.matrices
     if span is not None:
-        context.note(f"the wrench's frame {frame!r} moves on {base!r}; the handle's weight may not cancel out")
-    return Wrench(t_ns, force, turns[0] if span is None else turns)
+        findings.append(Finding(Kind.WRENCH_MOVES, frame, detail=base))
+    return Wrench(t_ns, force, turns[0] if constant else turns), tuple(findings)

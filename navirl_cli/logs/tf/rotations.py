@@ -120,6 +120,14 @@ def matrices(quaternions: FloatArray) -> FloatArray:
     return np.stack([rotate(quaternions, axis) for axis in np.eye(3)], axis=2)
 
 
+def roll_pitch_yaw(quaternions: FloatArray) -> FloatArray:
+    """Angles about the fixed axes x, y and z, in this order, of unit quaternions of shape (n, 4), rad, shape (n, 3)."""
+    turns = matrices(quaternions)
+    roll, yaw = np.arctan2(turns[:, 2, 1], turns[:, 2, 2]), np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    pitch = np.arcsin(np.clip(-turns[:, 2, 0], -1.0, 1.0))
+    return np.stack([roll, pitch, yaw], axis=1)
+
+
 def slerp(begin: FloatArray, end: FloatArray, share: FloatArray) -> FloatArray:
     """Spherical linear interpolation on the shorter arc.
 

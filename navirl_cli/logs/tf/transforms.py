@@ -22,6 +22,7 @@ from navirl_cli.logs.tf.rotations import (
     normalised,
     product,
     rescaled,
+    roll_pitch_yaw,
     rotate,
     slerp,
 )
@@ -178,6 +179,15 @@ class Curve:
         moved = np.abs(np.diff(self.translation_m, axis=0)).max(axis=1, initial=0.0) > _SAME
         turned = np.abs((self.quaternion[1:] * self.quaternion[:-1]).sum(axis=1)) < 1.0 - _SAME**2
         return np.flatnonzero(moved | turned) + 1 if self.fixed else np.zeros(0, dtype=np.int64)
+
+    def described(self, rows: Sequence[int]) -> list[str]:
+        """Some of the poses in words: place in m, and roll, pitch and yaw in degrees."""
+        turns = np.degrees(roll_pitch_yaw(self.quaternion[list(rows)]))
+        return [
+            f"({', '.join(f'{value:g}' for value in np.round(place, 3) + 0.0)}) m turned by "
+            f"({', '.join(f'{angle:g}' for angle in np.round(turn, 1) + 0.0)}) deg"
+            for place, turn in zip(self.translation_m[list(rows)], turns, strict=True)
+        ]
 
     @property
     def span(self) -> Span:

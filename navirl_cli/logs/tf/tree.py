@@ -174,6 +174,17 @@ class TransformTree:
         more = len(self.frames) - len(seen)
         return "; ".join(trees) + (f"; {more} more frames" if more else "") or "no frames"
 
+    def is_constant(self, target: str, source: str) -> bool:
+        """Whether the transform between two frames is the same at all times: static, and never sent again otherwise.
+
+        Raises:
+            FrameError: The frames are not connected or form a cycle.
+        """
+        chains = self._chains(target, source, _times([]))
+        return bool(chains) and not any(
+            curve.changes.size or not curve.fixed for chain in chains for curve in chain.curves
+        )
+
     def static_changes(self) -> list[Curve]:
         """The fixed transforms that are sent again with another value, by child."""
         curves = [curve for frame in sorted(self._parents) for curve in self._curves(frame)]

@@ -1,0 +1,131 @@
+"""What the stages of a log find out about it, as values. Each kind of finding has its words here, in one place."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+
+
+class Severity(StrEnum):
+    """What a finding means for the user."""
+
+    #: Worth showing by ``inspect`` only.
+    INFO = "info"
+    #: Unusual: something was corrected, assumed or sorted.
+    NOTE = "note"
+    #: Something of the log is lost to the extraction.
+    LOSS = "loss"
+
+
+_INFO, _NOTE, _LOSS = Severity.INFO, Severity.NOTE, Severity.LOSS
+
+
+class Kind(Enum):
+    """The kinds of findings: severity, and the sentence in which a finding's fields are filled in."""
+
+    # time
+    SIMULATED = (
+        _INFO,
+        (
+            "header stamps are simulated time, or time since the computer's start: {about} begins at {size:.2f} s; "
+            "extract goes by the stamps, unless `time` log"
+        ),
+    )
+    RECORDER_OFF = (
+        _INFO,
+        (
+            "header stamps of {about} differ by {size:+.3f} s from the recorder's clock; extract goes by the stamps, "
+            "unless `time` log"
+        ),
+    )
+    NO_STAMPS = (_NOTE, "no message on {about} has a stamp; times of receipt are used")
+    UNSTAMPED = (_NOTE, "{count} messages on {about} are stamped 0; their times of receipt are used")
+    WILD_STAMPS = (
+        _NOTE,
+        "{count} messages on {about} have stamps more than {size:g} s off their clock; their times of receipt are used",
+    )
+    CLOCK_STEP = (
+        _NOTE,
+        "{about} jumps by {size:+.2f} s {at_s:.1f} s after the start; later times were shifted to continue",
+    )
+    OTHER_CLOCK = (
+        _NOTE,
+        "{about} is stamped by another clock than {detail}: {size:+.3f} s by the times of receipt; aligned",
+    )
+    DRIFTING_CLOCK = (
+        _NOTE,
+        (
+            "{about} is stamped by another clock than {detail}: {size:+.3f} s by the times of receipt, changing by "
+            "{change:+.2f} s until the end; aligned"
+        ),
+    )
+    OUT_OF_ORDER = (_NOTE, "{count} messages on {about} were received out of order; sorted by time")
+    REPEATED = (_NOTE, "{count} messages on {about} repeat the time of another; the first counts")
+    # space
+    IGNORED_TRANSFORMS = (_NOTE, "transforms {about}: {detail}; ignored")
+    RESCALED = (_NOTE, "{about}: {detail}")
+    STATIC_CHANGES = (
+        _NOTE,
+        "the static transform {about} is sent again with another value: {detail}; each counts from when it was sent",
+    )
+    SEVERAL_PARENTS = (_NOTE, "tf gives {about!r} several parents in turn: {detail}")
+    UNCOVERED_POSES = (_NOTE, "{count} poses lie outside the time that tf covers; left out")
+    POSES_IN_GAPS = (_LOSS, "{count} poses lie in gaps of tf longer than {size:g} s; left out")
+    POSES_FROM_TF = (_NOTE, "no odometry: poses are those of {about!r} in tf")
+    BASE_ASSUMED = (
+        _NOTE,
+        "no message names the robot's own frame, and tf knows none of {detail}; {about} is assumed",
+    )
+    NO_WRENCH_FRAME = (
+        _NOTE,
+        "{about} names no frame; {detail!r} is assumed; name another with `wrench_frame`",
+    )
+    WRENCH_MOVES = (
+        _NOTE,
+        "the wrench's frame {about!r} moves on {detail!r}; the handle's weight may not cancel out",
+    )
+    # measurements
+    IMPLAUSIBLE = (_LOSS, "{count} messages on {about} hold implausible values ({detail}); left out")
+    OTHER_FRAME = (_LOSS, "{count} messages on {about} are not in frame {detail!r}, as the others are; left out")
+    UNPLACED_MESSAGES = (_LOSS, "{count} messages on {about} left out: {detail}")
+    UNPLACED_ENTRIES = (_LOSS, "{count} places on {about} left out: {detail}")
+
+    def __init__(self, severity: Severity, sentence: str) -> None:
+        self.severity = severity
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a stage found out; ``str`` of it is its sentence."""
+
+    kind: Kind
+    #: The topic, clock or frame that it is about.
+    about: str
+    #: Messages, poses or transforms concerned.
+    count: int = 0
+    #: In the unit that the kind's sentence names.
+    size: float = 0.0
+    #: When, s after the recording's first message; None for findings about the whole.
+    at_s: float | None = None
+    #: Change of the size until the end, same unit.
+    change: float = 0.0
+    #: Further words: another topic or frame, or a reason.
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return self.kind.sentence.format(
+            about=self.about,
+            count=self.count,
+            size=self.size,
+            at_s=self.at_s,
+            change=self.change,
+            detail=self.detail,
+        )
+
+
+Findings = tuple[Finding, ...]
+
+
+def texts(log: str, findings: Iterable[Finding], severity: Severity) -> tuple[str, ...]:
+    """The sentences of findings of one severity, each once, as ``log: sentence``."""
+    return tuple(dict.fromkeys(f"{log}: {one}" for one in findings if one.kind.severity is severity))
