@@ -52,7 +52,7 @@ def test_where_an_axis_rests_is_no_deflection(load):
 def test_implausible_poses_are_left_out_and_counted(load):
     recording = load(odometry_nan=3, odometry_zero=4)
     assert recording.damage == (
-        "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 without a rotation); left out",
+        "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 with a quaternion of zeros); left out",
     )
     seconds = (recording.t_ns - START_NS) / 1e9
     assert recording.xy_m == pytest.approx(position_m(seconds), abs=1e-9)

@@ -135,13 +135,14 @@ def test_implausible_values_are_reported_with_an_example(values, report):
 def test_poses_without_a_rotation_are_counted_separately():
     values = np.zeros((9, 3))
     values[2, 0], values[4, 0], values[6, 0] = np.nan, 5e6, 7e6
-    rotations = np.array([True, False, False, True, True, True, False, True, True])
-    good, found = plausible_messages("/odom", values, PLACES, rotations)
+    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (9, 1))
+    quaternions[[1, 2, 6], 3] = 0.0, 0.0, 3.0
+    good, found = plausible_messages("/odom", values, PLACES, quaternions)
     assert good.tolist() == [True, False, False, True, False, True, False, True, True]
     assert [str(one) for one in found] == [
         (
-            "4 messages on /odom hold implausible values (1 not finite, 2 without a rotation, 1 impossible, such as "
-            "5e+06 m); left out"
+            "4 messages on /odom hold implausible values (1 not finite, 1 with a quaternion of zeros, "
+            "1 with a quaternion of length 3, not 1, 1 impossible, such as 5e+06 m); left out"
         )
     ]
 

@@ -74,6 +74,7 @@ def extract(
     wrench_filter: float = 5.0,
     gain: bool = False,
     topic: Mapping[str, str | Sequence[str]] | None = None,
+    namespace: str | None = None,
     map: PathLike | None = None,  # noqa: A002 the option's name
     frame: str | None = None,
     no_wrench: bool = False,
@@ -101,6 +102,7 @@ def extract(
         wrench_filter: The force is low-passed below this frequency, Hz.
         gain: Estimate the robot's gain, its velocity per sideways force.
         topic: Topic of a role, or several topics, if several are possible: ``{"wrench": "/ft"}``.
+        namespace: Namespace of the robot, in a log of several robots: "/robot1".
         map: Nav2 map YAML beside its pgm or png, instead of the map in the log.
         frame: Frame of all results, instead of the map's frame.
         no_wrench: Ignore forces; also for logs without a wrench. Contact is then unknown.
@@ -143,6 +145,7 @@ def extract(
     map_file = None if map is None else Path(map)
     options = LoadOptions(
         topics=topics_in(topic),
+        namespace=namespace,
         time=chosen(TimeSource, time, "time"),
         frame=frame,
         wrench_frame=wrench_frame,
@@ -174,13 +177,17 @@ def _extracted(
 
 
 def inspect(
-    *logs: PathLike, topic: Mapping[str, str | Sequence[str]] | None = None, check: bool = False
+    *logs: PathLike,
+    topic: Mapping[str, str | Sequence[str]] | None = None,
+    namespace: str | None = None,
+    check: bool = False,
 ) -> list[Overview]:
     """The content of logs, and the topics that :func:`extract` would use, as ``navirl inspect``.
 
     Args:
         *logs: As in :func:`extract`.
         topic: As in :func:`extract`.
+        namespace: As in :func:`extract`.
         check: Read every message. This also finds damage inside chunks.
 
     Returns:
@@ -195,7 +202,7 @@ def inspect(
     """
     if not logs:
         raise ArgumentError("`logs`: expected at least one log, found none")
-    return [overview(source, topics_in(topic), check=check) for source in sources_of(logs)]
+    return [overview(source, topics_in(topic), namespace, check=check) for source in sources_of(logs)]
 
 
 def fit(

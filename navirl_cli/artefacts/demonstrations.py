@@ -58,6 +58,7 @@ def settings_document(settings: "ExtractSettings", options: "LoadOptions", map_f
 
     return asdict(settings) | {
         "topics": {role: list(names) for role, names in options.topics.items()},
+        "namespace": options.namespace,
         "time": options.time.value,
         "frame": options.frame,
         "wrench_frame": options.wrench_frame,

@@ -16,6 +16,7 @@ from navirl_cli.commands.shared import (
     json_option,
     logs_argument,
     merged,
+    namespace_option,
     output_option,
     say,
     topic_option,
@@ -48,6 +49,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 @section(
     "Input",
     topic_option,
+    namespace_option,
     click.option(
         "--map", "map_file", type=FilePath, help="Nav2 map YAML beside its pgm or png, instead of the map in the log."
     ),
@@ -131,6 +133,7 @@ def extract(
     wrench_filter: float,
     gain: bool,
     topics: tuple[tuple[str, str], ...],
+    namespace: str | None,
     map_file: Path | None,
     frame: str | None,
     no_wrench: bool,
@@ -171,6 +174,7 @@ def extract(
     )
     options = LoadOptions(
         topics=chosen,
+        namespace=namespace,
         time=TimeSource(time_source),
         frame=frame,
         wrench_frame=wrench_frame,

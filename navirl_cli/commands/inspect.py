@@ -11,6 +11,7 @@ from navirl_cli.commands.shared import (
     finish,
     json_option,
     logs_argument,
+    namespace_option,
     say,
     topic_option,
     topics_by_role,
@@ -35,10 +36,13 @@ from navirl_cli.reports.overview import overview_document, overview_report
 @section(
     "Input",
     topic_option,
+    namespace_option,
     click.option("--check", is_flag=True, help="Read every message. This also finds damage inside chunks."),
 )
 @section("Output", json_option)
-def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: bool, as_json: bool) -> None:
+def inspect(
+    logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], namespace: str | None, check: bool, as_json: bool
+) -> None:
     """Show the content of logs, and the topics that extract would use.
 
     LOG is an MCAP file, a rosbag2 folder, a folder of recordings, or a pattern. The output lists duration, clocks and
@@ -54,7 +58,7 @@ def inspect(logs: tuple[Path, ...], topics: tuple[tuple[str, str], ...], check: 
     with bytes_bar("inspect") as update:
         for source in sources_of(logs, refused=refused):
             try:
-                views.append(overview(source, topics_by_role(topics), check=check, progress=update))
+                views.append(overview(source, topics_by_role(topics), namespace, check=check, progress=update))
             except LogError as error:
                 refused.append(error)
     if refused and not views:

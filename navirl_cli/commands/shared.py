@@ -36,6 +36,9 @@ topic_option = click.option(
     shell_complete=completion.topics,
     help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
 )
+namespace_option = click.option(
+    "--namespace", metavar="/ROBOT", help="The robot's namespace, in a log of several robots, e.g. /robot1."
+)
 
 
 def samples_option(default: int = 1000) -> Callable[[Function], Function]:

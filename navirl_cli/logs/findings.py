@@ -22,6 +22,8 @@ _INFO, _NOTE, _LOSS = Severity.INFO, Severity.NOTE, Severity.LOSS
 class Kind(Enum):
     """The kinds of findings: severity, and the sentence in which a finding's fields are filled in."""
 
+    # choice
+    OTHER_ROBOT = (_NOTE, "{about} is left out: it is not in the namespace of odometry, wrench and map")
     # time
     SIMULATED = (
         _INFO,

@@ -19,10 +19,10 @@ from enum import StrEnum
 from pathlib import Path
 
 from navirl_cli.arrays import ByContent
-from navirl_cli.errors import LogError, NavirlError
+from navirl_cli.errors import FrameError, LogError, NavirlError
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.findings import Findings, Severity, texts
+from navirl_cli.logs.findings import Finding, Findings, Kind, Severity, texts
 from navirl_cli.logs.messages.reader import Contents, Progress, scan
 from navirl_cli.logs.recording import Occupancy, Recording, Session
 from navirl_cli.logs.roles.clocks import TimeSource
@@ -50,6 +50,8 @@ class LoadOptions(ByContent):
 
     #: Topics by role, in place of those that navirl would choose.
     topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    #: Of the robot, in a log of several robots.
+    namespace: str | None = None
     time: TimeSource = TimeSource.HEADER
     #: The frame that everything is brought into, in place of the map's.
     frame: str | None = None
@@ -130,7 +132,7 @@ def follow(
     """
     log = source.name
     topics = topics_of(contents)
-    choices = choose(log, topics, options.topics)
+    choices = choose(log, topics, options.topics, options.namespace)
     chosen = _wanted(choices, options)
     refusals: list[NavirlError] = [refusal(log, topics, one) for one in chosen.values() if is_missing(one, chosen)]
     read = read_tables(log, files, chosen, progress)
@@ -138,11 +140,16 @@ def follow(
     timed = placed = None
     try:
         timed = on_one_clock(log, read.tables, options.time)
-        placed = in_one_frame(log, timed.tables, options.frame, options.wrench_frame, options.occupancy)
+        placed = in_one_frame(
+            log, timed.tables, options.frame, options.wrench_frame, options.occupancy, options.namespace
+        )
         refusals += placed.refusals
     except NavirlError as error:
         refusals.append(error)
-    findings = (*(timed.findings if timed else ()), *(placed.findings if placed else ()))
+    foreign = {topic.name: None for choice in chosen.values() for topic in choice.foreign}
+    refusals = [_with_foreign(one, tuple(foreign)) for one in refusals]
+    others = tuple(Finding(Kind.OTHER_ROBOT, name) for name in foreign)
+    findings = (*others, *(timed.findings if timed else ()), *(placed.findings if placed else ()))
     lost = (*map(str, (*source.damage, *read.damage)), *texts(log, findings, Severity.LOSS))
     if lost and options.strict:
         refusals.append(LogError(f"{log}: damaged, which `strict` refuses: {'; '.join(lost)}"))
@@ -155,6 +162,15 @@ def follow(
     except NavirlError as error:
         refusals.append(error)
     return Line(choices, timed, placed, findings, lost, recording, tuple(refusals))
+
+
+def _with_foreign(refusal: NavirlError, foreign: Sequence[str]) -> NavirlError:
+    """A refusal that, where frames do not connect, names the tf topics that were left out as another robot's."""
+    if not isinstance(refusal, FrameError) or not foreign:
+        return refusal
+    role = "tf_static" if foreign[0].endswith("tf_static") else "tf"
+    left_out = f"{', '.join(foreign)} left out as another robot's; if it is this one's, `topic` {role}={foreign[0]}"
+    return FrameError(f"{refusal}; {left_out}")
 
 
 def _wanted(choices: Mapping[str, Choice], options: LoadOptions) -> dict[str, Choice]:

@@ -14,7 +14,7 @@ from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context, in_one_frame, plausible
 from navirl_cli.logs.roles.plausible import PLACES
 from navirl_cli.logs.roles.times import without_repeats
-from navirl_cli.logs.tf.rotations import are_rotations, normalised
+from navirl_cli.logs.tf.rotations import normalised
 from navirl_cli.logs.tf.transforms import Transforms
 
 #: Gaps of tf that are longer are not interpolated over, ns.
@@ -60,10 +60,13 @@ def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings
     if columns is None:
         return _from_tf(context)
     columns, frame, others = in_one_frame(columns)
-    rotations = are_rotations(columns.stacked(*_ROTATION))
-    columns, implausible = plausible(columns, PLACES, *_POSITION, rotations=rotations)
+    columns, implausible = plausible(columns, PLACES, *_POSITION, quaternions=columns.stacked(*_ROTATION))
     if len(columns) == 0:
-        raise LogError(f"{context.log}: topic {columns.topic}: expected poses, found none that are finite")
+        why = next((f" ({one.detail})" for one in implausible if one.detail), "")
+        raise LogError(
+            f"{context.log}: topic {columns.topic}: expected poses, found none that are finite{why}; record the "
+            "odometry again, or name another topic with `topic` odometry=/name"
+        )
     columns, repeated = without_repeats(columns)
     base, assumed = context.base_frame(str(columns["child"][0]) if "child" in columns else "")
     rows, uncovered = _covered(columns.topic, base, columns.t_ns, frame, context)

@@ -7,7 +7,7 @@ from typing import Any, Final, TypeVar
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.errors import NavirlError
+from navirl_cli.errors import FrameError, NavirlError
 from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Occupancy, Track, Wrench
 from navirl_cli.logs.roles.clocks import NS_PER_S
@@ -47,7 +47,12 @@ class Placed:
 
 
 def in_one_frame(
-    log: str, tables: Tables, frame: str | None, wrench_frame: str | None, occupancy: Occupancy | None
+    log: str,
+    tables: Tables,
+    frame: str | None,
+    wrench_frame: str | None,
+    occupancy: Occupancy | None,
+    namespace: str | None = None,
 ) -> Placed:
     """Bring poses, forces, people, goals and the map into the map's or the chosen frame.
 
@@ -57,6 +62,7 @@ def in_one_frame(
         frame: The frame that everything is brought into, in place of the map's.
         wrench_frame: The frame that the wrench is given in, in place of its header's.
         occupancy: A map in place of the log's, in the fixed frame.
+        namespace: Of the robot, where the user named it.
     """
     tree = TransformTree(
         [
@@ -80,11 +86,12 @@ def in_one_frame(
     own_map = (occupancy, "") if occupancy is not None else None
     maps = tables.get("map", ())
     map_and_frame = own_map or (attempt(lambda: map_in(log, maps)) if maps else None)
-    context = Context(log, tree, frame or (map_and_frame[1] if map_and_frame else "") or _MAP_FRAME)
+    fixed = frame or (map_and_frame[1] if map_and_frame else "") or _MAP_FRAME
+    context = Context(log, tree, fixed, namespace or "")
     poses = attempt(lambda: poses_of(_first(tables, "odometry"), context))
     forces = _first(tables, "wrench")
-    base = poses[0].base if poses else context.base_frame("")[0]
-    wrench = attempt(lambda: wrench_of(forces, context, base, wrench_frame)) if forces else None
+    base = poses[0].base if poses else _usual_base(context)
+    wrench = attempt(lambda: wrench_of(forces, context, base, wrench_frame)) if forces and base else None
     people_t_ns, people, lost_people = people_of(tables.get("people", ()), context)
     goal_t_ns, goal_m, lost_goals = goals_of(_first(tables, "goal"), context)
     placed_map = attempt(lambda: occupancy_of(map_and_frame, context)) if map_and_frame else None
@@ -106,6 +113,14 @@ def in_one_frame(
         ),
         refusals=tuple(refusals),
     )
+
+
+def _usual_base(context: Context) -> str:
+    """The robot's own frame where no message names it; "" where several could be, as the poses' refusal says."""
+    try:
+        return context.base_frame("")[0]
+    except FrameError:
+        return ""
 
 
 def _first(tables: Tables, role: str) -> Columns | None:
