@@ -113,6 +113,7 @@ TABLES = {
     "extract": ["p01.mcap", "-o", "new.json"],
     "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
     "evaluate": ["demos.json"],
+    "plan": ["reward.json", "--scene", "demos.json"],
     "import-study": ["runs.tar.gz", "-o", "new"],
     "simulate": ["--participants", "1", "-o", "new"],
     "study": ["demos.json", "--samples", "20", "-o", "new"],
@@ -139,7 +140,16 @@ def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch
 
 
 #: Objects whose keys are names of the data: participants, groups, modalities, metrics, reasons.
-BY_DATA = {"participants", "metrics", "completion_s", "missing", "missing_on_grid", "by_participant"}
+BY_DATA = {
+    "parameters",
+    "reward_by_term",
+    "participants",
+    "metrics",
+    "completion_s",
+    "missing",
+    "missing_on_grid",
+    "by_participant",
+}
 
 
 def keys_in(document, by_data=False):

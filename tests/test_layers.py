@@ -17,7 +17,7 @@ ORDERS = {
         ["demos"],
         ["irl"],
         ["evaluation"],
-        ["study", "simulation", "published"],
+        ["study", "simulation", "published", "planning"],
         ["artefacts"],
         ["reports"],
         ["figures"],

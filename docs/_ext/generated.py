@@ -21,7 +21,7 @@ from navirl_cli.reports.evaluation import metrics_table
 
 HERE = Path(__file__).parent.parent
 GENERATED = HERE / "_generated"
-KINDS = ("demonstrations", "reward", "metrics", "study")
+KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 
 
 class Markdown(click.HelpFormatter):
