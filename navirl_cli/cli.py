@@ -37,7 +37,7 @@ class _Root(LazyGroup):
         except NavirlError as error:
             if ctx.params.get("debug"):
                 raise
-            line, code = as_options(str(error)), 1
+            line, code = as_options(str(error)), error.exit_code
         except KeyboardInterrupt:
             line, code = "interrupted", 130  # as a shell reports a process that SIGINT ended
         click.echo(f"navirl: {line}", err=True)

@@ -70,6 +70,7 @@ def extract(
     rasterizer: str = "study",
     person: Point | Sequence[Point] = (),
     goal: Point | None = None,
+    keep_truncated: bool = False,
     contact_force: float = 3.0,
     wrench_filter: float = 5.0,
     gain: bool = False,
@@ -98,6 +99,7 @@ def extract(
         rasterizer: Rule that turns a path into cells: "study", "crossed" or "chain".
         person: Position (x, y) of a person, m in the map frame, or several positions; instead of the log's people.
         goal: Goal (x, y), m in the map frame, instead of the log's goals.
+        keep_truncated: Keep trials whose poses are missing at the beginning or end, marked as truncated.
         contact_force: A contact begins above this force, N, and ends below half of it.
         wrench_filter: The force is low-passed below this frequency, Hz.
         gain: Estimate the robot's gain, its velocity per sideways force.
@@ -141,6 +143,7 @@ def extract(
         people_m=points_in(person) or None,
         goal_m=None if goal is None else points_in(goal)[0],
         gain=gain,
+        keep_truncated=keep_truncated,
     )
     map_file = None if map is None else Path(map)
     options = LoadOptions(
@@ -215,6 +218,7 @@ def fit(
     condition: str | Collection[str] = (),
     cycle: int | None = None,
     only_corrected: bool = False,
+    truncated: bool = False,
     steps: str = "all",
     correct_bias: bool = False,
     bootstrap: int | None = None,
@@ -238,6 +242,7 @@ def fit(
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
+        truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, or only those during "contact".
         correct_bias: Subtract the first-order bias of maximum likelihood.
         bootstrap: Fit this many times with participants drawn with replacement.
@@ -270,7 +275,9 @@ def fit(
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
     conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
-    selected = select(demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=which)
+    selected = select(
+        demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, truncated=truncated, steps=which
+    )
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")

@@ -82,6 +82,11 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
     click.option(
         "--person", "people", multiple=True, type=Point(), help="Position of a person in the map frame, m; repeatable."
     ),
+    click.option(
+        "--keep-truncated",
+        is_flag=True,
+        help="Keep trials whose poses are missing at the beginning or end, marked as truncated.",
+    ),
     click.option("--participant", help="Participant, instead of the name in the log or of the file."),
 )
 @section(
@@ -129,6 +134,7 @@ def extract(
     rasterizer: str,
     people: tuple[tuple[float, float], ...],
     goal: tuple[float, float] | None,
+    keep_truncated: bool,
     contact_force: float,
     wrench_filter: float,
     gain: bool,
@@ -171,6 +177,7 @@ def extract(
         people_m=people or None,
         goal_m=goal,
         gain=gain,
+        keep_truncated=keep_truncated,
     )
     options = LoadOptions(
         topics=chosen,

@@ -26,7 +26,8 @@ from navirl_cli.demos.grid import Grid, grid_from_occupancy
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, trials_of
-from navirl_cli.errors import DemonstrationError, NavirlError
+from navirl_cli.demos.truncation import truncation_of, unseen_goals
+from navirl_cli.errors import DemonstrationError, NavirlError, TruncatedError
 from navirl_cli.logs.recording import Declared, Published, Recording
 
 Entry = TypeVar("Entry", Declared, Published)
@@ -55,6 +56,8 @@ class ExtractSettings:
     goal_m: tuple[float, float] | None = None
     #: Whether to estimate how fast the robot gives way to a push.
     gain: bool = False
+    #: Whether trials that are cut off are kept, marked as truncated.
+    keep_truncated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,24 +107,29 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     trials = trials_of(recording, settings.split)
     participant = settings.participant or recording.session.participant or recording.log.partition(".mcap")[0]
     found: list[Demonstration] = []
-    skipped: list[tuple[int, str]] = []
+    skipped: list[tuple[int, NavirlError]] = []
     for number, trial in enumerate(trials, start=1):
         name = f"{participant}/{number}"
         try:
             found.append(_demonstration(recording, trial, pushes, grid, settings, name))
         except NavirlError as error:
-            skipped.append((number, str(error)))
+            skipped.append((number, error))
+    unseen = unseen_goals(recording) if settings.split is Split.GOAL else ""
+    reasons = [*_grouped(skipped), *([unseen] if unseen else [])]
     if not found:
-        reasons = "; ".join(_grouped(skipped)) or "no goal is announced while poses are recorded"
-        raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
-    lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
+        cut = bool(skipped) and all(isinstance(error, TruncatedError) for _, error in skipped)
+        why = "; ".join(reasons) or "no goal is announced while poses are recorded"
+        text = f"{recording.log}: no trial became a demonstration: {why}"
+        raise TruncatedError(text) if cut else DemonstrationError(text)
+    lines = tuple(f"{recording.log}: {line}" for line in reasons)
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
+    warnings = tuple(line.removeprefix(f"{recording.log}: ") for line in (*recording.damage, *notes))
     return Extraction(
         log=recording.log,
-        demonstrations=tuple(found),
+        demonstrations=tuple(replace(one, warnings=warnings) for one in found),
         trials=len(trials),
         skipped=lines,
         damage=recording.damage,
@@ -156,11 +164,11 @@ def _with_goal(recording: Recording, settings: ExtractSettings) -> Recording:
     return replace(recording, goal_t_ns=times, goal_m=np.tile(settings.goal_m, (len(times), 1)))
 
 
-def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
+def _grouped(skipped: Sequence[tuple[int, NavirlError]]) -> list[str]:
     """One line for each reason."""
     by_reason: dict[str, list[str]] = {}
-    for number, reason in skipped:
-        by_reason.setdefault(reason, []).append(str(number))
+    for number, error in skipped:
+        by_reason.setdefault(str(error), []).append(str(number))
     return [
         f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: {reason}"
         for reason, numbers in by_reason.items()
@@ -176,6 +184,7 @@ def _demonstration(
     start_ns, stop_ns = int(t_ns[0]), int(t_ns[-1])
     check_travel(xy)
     check_gaps(recording, trial, pushes)
+    cut_off = _cut_off(recording, trial, settings)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
     people = _people(recording, settings, start_ns, stop_ns)
     radius_m = _radius_m(recording, settings)
@@ -186,7 +195,7 @@ def _demonstration(
     declared = _nearest(recording.session.declared, start_ns, stop_ns) or Declared(start_ns)
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
     observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
-    notes = [*path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
+    notes = [*cut_off, *path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
@@ -209,8 +218,23 @@ def _demonstration(
         set=declared.set,
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
+        truncated=bool(cut_off),
         notes=(*notes, *people.notes, *people_notes(recording, people.people_m)),
     )
+
+
+def _cut_off(recording: Recording, trial: Trial, settings: ExtractSettings) -> list[str]:
+    """A note where a trial is cut off, which is refused unless the user keeps such trials."""
+    reason = truncation_of(recording, trial, settings.split)
+    if not reason:
+        return []
+    away = recording.xy_m[trial.stop - 1] - (recording.xy_m[trial.stop - 1] if trial.goal_m is None else trial.goal_m)
+    far = (
+        "" if trial.arrived or trial.goal_m is None else f", and the last pose is {np.hypot(*away):.2f} m from the goal"
+    )
+    if not settings.keep_truncated:
+        raise TruncatedError(f"cut off: {reason}{far}; keep it, marked as truncated, with `keep_truncated`")
+    return [f"truncated: {reason}"]
 
 
 def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple[IntArray, Grid]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
-from navirl_cli.errors import DemonstrationError, LogError, NavirlError
+from navirl_cli.errors import DemonstrationError, LogError, NavirlError, TruncatedError
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
@@ -87,7 +87,8 @@ def extract_recordings(
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
-        raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
+        kind = TruncatedError if all(isinstance(error, TruncatedError) for error in failed) else DemonstrationError
+        raise kind("none of the logs can be used: " + "; ".join(str(error) for error in failed))
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),

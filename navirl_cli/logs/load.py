@@ -30,7 +30,7 @@ from navirl_cli.logs.roles.commands import commands_of
 from navirl_cli.logs.roles.session import session_of
 from navirl_cli.logs.roles.space import Placed, in_one_frame
 from navirl_cli.logs.roles.tables import read_tables
-from navirl_cli.logs.roles.times import Tables, Timed, on_one_clock
+from navirl_cli.logs.roles.times import Tables, Timed, measured_ns, on_one_clock
 from navirl_cli.logs.roles.topics import Choice, choose, is_missing, refusal, topics_of
 from navirl_cli.logs.sources import Source
 
@@ -207,6 +207,8 @@ def _recording(
         session=session,
         velocity_m_s=placed.poses.velocity_m_s,
         jumps=placed.poses.jumps,
+        unplaced_ns=placed.poses.unplaced_ns,
+        measured_ns=measured_ns(tables),
         damage=damage,
         notes=notes,
     )

@@ -128,6 +128,10 @@ class Recording:
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
+    #: (u,) ns of odometry that tf does not place.
+    unplaced_ns: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    #: First and last time of anything that was measured, ns; None: those of the poses.
+    measured_ns: tuple[int, int] | None = None
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
     #: What is unusual about the log, in words.
@@ -143,3 +147,10 @@ class Recording:
             raise LogError(
                 f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
             )
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """First and last time at which anything was measured, ns."""
+        first, last = int(self.t_ns[0]), int(self.t_ns[-1])
+        given = self.measured_ns or (first, last)
+        return min(given[0], first), max(given[1], last)

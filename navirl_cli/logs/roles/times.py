@@ -22,6 +22,11 @@ _IN_ORDER: Final = ("odometry", "wrench")
 _MOMENTARY: Final = ("goal", "joystick")
 #: Roles of which each message counts from its receipt on, whatever its stamps are.
 _RECEIVED: Final = ("tf_static",)
+#: Roles whose messages show that a log goes on, from so many messages on.
+_REGULAR: Final = ("odometry", "wrench", "people", "joystick")
+_FEWEST: Final = 10
+#: How far ahead tf may be stamped, ns.
+_AHEAD_NS: Final = NS_PER_S
 #: Roles whose times nothing depends on.
 _TIMELESS: Final = ("map",)
 
@@ -64,6 +69,19 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
             timed[role] = [one for one, _ in ordered]
             findings += [finding for _, some in ordered for finding in some]
     return Timed(timed, (*findings, *clock.findings))
+
+
+def measured_ns(tables: Tables) -> tuple[int, int] | None:
+    """First and last time of what was measured regularly, ns; None for nothing.
+
+    tf, whose stamps may lie ahead on purpose, counts with as much taken off at its end.
+    """
+    times = [one.t_ns for role in _REGULAR for one in tables.get(role, ()) if len(one) >= _FEWEST]
+    for one in tables.get("tf", ()):
+        stamps = one["header.stamp"]
+        if len(one) >= _FEWEST and len(stamps := stamps[stamps > 0]):
+            times.append(np.array([stamps.min(), stamps.max() - _AHEAD_NS]))
+    return (min(int(one.min()) for one in times), max(int(one.max()) for one in times)) if times else None
 
 
 def in_order(columns: Columns) -> tuple[Columns, Findings]:
