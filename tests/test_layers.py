@@ -27,9 +27,11 @@ ORDERS = {
         ["__main__"],
     ],
     "navirl_cli.logs": [
-        ["__init__", "findings", "recording", "yaml_file"],
+        ["__init__", "findings", "occupancy", "yaml_file"],
+        ["recording"],
         ["container", "tf"],
-        ["messages", "sources", "map_file"],
+        ["messages", "sources", "map_geometry"],
+        ["map_file"],
         ["roles"],
         ["load"],
         ["overview"],
@@ -43,7 +45,14 @@ ORDERS = {
         ["survey", "opener"],
         ["log_file"],
     ],
-    "navirl_cli.logs.messages": [["__init__", "schema"], ["layout"], ["decode", "writer"], ["series"], ["reader"]],
+    "navirl_cli.logs.messages": [
+        ["__init__", "schema"],
+        ["layout"],
+        ["decode", "writer"],
+        ["packing"],
+        ["series"],
+        ["reader"],
+    ],
     "navirl_cli.logs.tf": [["__init__", "rotations"], ["transforms"], ["tree"]],
 }
 

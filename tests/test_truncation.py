@@ -154,9 +154,7 @@ def test_fit_leaves_truncated_trials_out_unless_asked():
     whole, cut = of("a/1"), of("a/2", truncated=True)
     assert [one.id for one in select([whole, cut]).demonstrations] == ["a/1"]
     assert [one.id for one in select([whole, cut], truncated=True).demonstrations] == ["a/1", "a/2"]
-    with pytest.raises(
-        DemonstrationError, match=r"expected demonstrations that are whole, found 1 that are cut off"
-    ):
+    with pytest.raises(DemonstrationError, match=r"expected demonstrations that are whole, found 1 that are cut off"):
         select([cut])
 
 

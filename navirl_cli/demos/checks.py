@@ -9,6 +9,7 @@ from navirl_cli.demos.lines import path_length_m, thinned
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Trial
 from navirl_cli.demos.truncation import POSE_GAP_S, missing_tf
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.logs.occupancy import Occupancy
 from navirl_cli.logs.recording import Recording
 
 #: A contact's force must exceed the noise this many times.
@@ -131,12 +132,11 @@ def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
     return [f"the localisation {how} by {largest.size_m:.2f} m at {(largest.t_ns - start_ns) / 1e9:.1f} s"]
 
 
-def people_notes(recording: Recording, people: FloatArray) -> list[str]:
-    """A scene without people, and people in a wall or off the map."""
+def people_notes(recording: Recording, occupancy: Occupancy, people: FloatArray) -> list[str]:
+    """A scene without people, and people in a wall or off the map of a trial."""
     if len(people) == 0:
         remedy = "" if len(recording.people_t_ns) else "; give their places with `person` x,y"
         return [f"no people in the scene{remedy}"]
-    occupancy = recording.occupancy
     walls = Grid(occupancy.data >= OCCUPIED_FROM, occupancy.resolution_m, occupancy.origin_m)
     inside, blocked = walls.contains(walls.cells_of(people)), walls.is_occupied(walls.cells_of(people))
     return [

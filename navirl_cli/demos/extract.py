@@ -22,7 +22,8 @@ from navirl_cli.demos.checks import (
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
-from navirl_cli.demos.grid import Grid, grid_from_occupancy
+from navirl_cli.demos.grid import Grid
+from navirl_cli.demos.ground import TrialGrids
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, trials_of
@@ -99,10 +100,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         NavirlError: No trial of the recording is usable.
     """
     recording = _with_goal(recording, settings)
-    occupancy, radius_m = recording.occupancy, _radius_m(recording, settings)
-    grid = grid_from_occupancy(occupancy.data, occupancy.resolution_m, occupancy.origin_m, radius_m).resampled(
-        settings.resolution_m
-    )
+    grids = TrialGrids(recording, _radius_m(recording, settings), settings.resolution_m)
     pushes = None if recording.wrench is None else pushes_of(recording, settings.push)
     trials = trials_of(recording, settings.split)
     participant = settings.participant or recording.session.participant or recording.log.partition(".mcap")[0]
@@ -111,7 +109,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     for number, trial in enumerate(trials, start=1):
         name = f"{participant}/{number}"
         try:
-            found.append(_demonstration(recording, trial, pushes, grid, settings, name))
+            found.append(_demonstration(recording, trial, pushes, grids, settings, name))
         except NavirlError as error:
             skipped.append((number, error))
     unseen = unseen_goals(recording) if settings.split is Split.GOAL else ""
@@ -176,7 +174,7 @@ def _grouped(skipped: Sequence[tuple[int, NavirlError]]) -> list[str]:
 
 
 def _demonstration(
-    recording: Recording, trial: Trial, pushes: Pushes | None, grid: Grid, settings: ExtractSettings, name: str
+    recording: Recording, trial: Trial, pushes: Pushes | None, grids: TrialGrids, settings: ExtractSettings, name: str
 ) -> Demonstration:
     """One trial as a demonstration."""
     span = slice(trial.first, trial.stop)
@@ -189,13 +187,20 @@ def _demonstration(
     people = _people(recording, settings, start_ns, stop_ns)
     radius_m = _radius_m(recording, settings)
     check_start(people.people_m, xy[0], radius_m)
+    ground = grids.during(start_ns, stop_ns)
+    grid, occupancy = ground.grid, ground.occupancy
     cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
         check_goal(free, xy[0], goal)
     declared = _nearest(recording.session.declared, start_ns, stop_ns) or Declared(start_ns)
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
     observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
-    notes = [*cut_off, *path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
+    notes = [
+        *cut_off,
+        *ground.notes,
+        *path_notes(trial, cells, grid, xy[-1] - goal),
+        *jump_notes(recording, start_ns, stop_ns),
+    ]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
@@ -219,7 +224,7 @@ def _demonstration(
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
         truncated=bool(cut_off),
-        notes=(*notes, *people.notes, *people_notes(recording, people.people_m)),
+        notes=(*notes, *people.notes, *people_notes(recording, occupancy, people.people_m)),
     )
 
 

@@ -85,6 +85,10 @@ class Kind(Enum):
         _NOTE,
         "the wrench's frame {about!r} moves on {detail!r}; the handle's weight may not cancel out",
     )
+    UNUSABLE_MAPS = (_LOSS, "{count} maps on {about} cannot be used ({detail}); left out")
+    EMPTY_ORIGIN = (_NOTE, "{count} maps on {about} have an origin with a quaternion of zeros; taken as not rotated")
+    OUTSIDE_UPDATES = (_LOSS, "{count} updates on {about} do not lie within the map before them; left out")
+    MAP_CHANGES = (_NOTE, "{about} changes: {detail}; each trial has the map in force at its end")
     # measurements
     IMPLAUSIBLE = (_LOSS, "{count} messages on {about} hold implausible values ({detail}); left out")
     OTHER_FRAME = (_LOSS, "{count} messages on {about} are not in frame {detail!r}, as the others are; left out")

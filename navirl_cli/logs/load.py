@@ -198,6 +198,7 @@ def _recording(
         yaw_rad=placed.poses.yaw_rad,
         wrench=placed.wrench,
         occupancy=placed.occupancy,
+        maps=placed.maps,
         goal_t_ns=placed.goal_t_ns,
         goal_m=placed.goal_m,
         people_t_ns=placed.people_t_ns,

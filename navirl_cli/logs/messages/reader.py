@@ -11,6 +11,7 @@ from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import DecodedBatch
+from navirl_cli.logs.messages.packing import Packer
 from navirl_cli.logs.messages.series import Series, SeriesBuilder
 
 #: Called with the bytes done and the bytes of all files.
@@ -101,7 +102,7 @@ def read(
     wants: Mapping[str, Sequence[str]],
     progress: Progress | None = None,
     threads: int | None = None,
-    latest: Collection[str] = (),
+    packed: Collection[str] = (),
 ) -> ReadResult:
     """Read topics from one or several files.
 
@@ -111,7 +112,8 @@ def read(
             columns.
         progress: Called with the bytes done and the bytes of all files.
         threads: Number of threads that decompress and decode; by default one for each core, four at most.
-        latest: Topics of which only the message received last is wanted, such as maps that are sent repeatedly.
+        packed: Topics whose sequences are int8 and are kept compressed by zlib, one object of bytes a message, such as
+            maps that are sent repeatedly.
 
     Returns:
         A series for each wanted topic that a file has, and the damage. Damage includes channels whose encoding,
@@ -122,7 +124,7 @@ def read(
     """
     files = [paths] if isinstance(paths, Path | str | RawFile) else list(paths)
     sizes = [_size(path) for path in files]
-    builders = {topic: SeriesBuilder(topic, topic in latest) for topic in wants}
+    builders = {topic: SeriesBuilder(topic, Packer() if topic in packed else None) for topic in wants}
     damage: list[Damage] = []
     begin = 0
     for number, path in enumerate(files):
@@ -188,11 +190,7 @@ class _Walk:
         """Walk over a file."""
         for decoded, count in log.results(self.wanted, self.decoded, threads):
             self.seen[decoded.channel.id] += count
-            batches = self.batches[decoded.channel.topic]
-            batches.append(decoded)
-            if self.builders[decoded.channel.topic].latest:
-                filled = [one for one in batches if len(one.order)]
-                batches[:] = sorted(filled, key=lambda one: int(one.log_time_ns.max()))[-1:] or batches
+            self.batches[decoded.channel.topic].append(decoded)
             progress(log.position / log.size)
         for channel in log.channels:
             self.wanted(channel)
@@ -209,9 +207,9 @@ class _Walk:
     def decoded(self, batch: Batch) -> tuple[DecodedBatch, int]:
         """A batch's columns, and its number of messages; in any thread."""
         builder = self.builders[batch.channel.topic]
-        decoder = builder.decoders[batch.channel]
-        newest = decoder.decode(batch.newest()) if builder.latest else None
-        decoded = newest if newest is not None and len(newest.order) else decoder.decode(batch)
+        decoded = builder.decoders[batch.channel].decode(batch)
+        if builder.packer is not None:
+            decoded = builder.packer.packed(decoded)
         return decoded, len(batch.starts)
 
     def undecodable(self, log: LogFile) -> list[str]:

@@ -149,6 +149,13 @@ MAPS: Final = (
     ),
 )
 
+#: Updates of a part of a map, on the topic of the map's name with "_updates".
+MAP_UPDATES: Final = MessageType(
+    "map_msgs/msg/OccupancyGridUpdate",
+    _STAMP | {"frame": "header.frame_id", "x": "x", "y": "y", "width": "width", "height": "height", "data": "data[]"},
+    "data[]",
+)
+
 GOALS: Final = (
     replace(
         _POSE_STAMPED,

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.errors import FrameError, NavirlError
 from navirl_cli.logs.findings import Finding, Findings, Kind
+from navirl_cli.logs.occupancy import MapHistory
 from navirl_cli.logs.recording import Occupancy, Track, Wrench
 from navirl_cli.logs.roles.clocks import NS_PER_S
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
-from navirl_cli.logs.roles.maps import map_in, occupancy_of
+from navirl_cli.logs.roles.maps import maps_in, placed_maps
 from navirl_cli.logs.roles.people import goals_of, people_of
 from navirl_cli.logs.roles.poses import Poses, poses_of
 from navirl_cli.logs.roles.times import Tables
@@ -36,7 +37,9 @@ class Placed:
     context: Context
     poses: Poses | None
     wrench: Wrench | None
+    #: The last map, and all maps where there are several.
     occupancy: Occupancy | None
+    maps: MapHistory | None
     goal_t_ns: IntArray
     goal_m: FloatArray
     people_t_ns: IntArray
@@ -83,10 +86,9 @@ def in_one_frame(
             refusals.append(error)
             return None
 
-    own_map = (occupancy, "") if occupancy is not None else None
-    maps = tables.get("map", ())
-    map_and_frame = own_map or (attempt(lambda: map_in(log, maps)) if maps else None)
-    fixed = frame or (map_and_frame[1] if map_and_frame else "") or _MAP_FRAME
+    topics = tables.get("map", ()) if occupancy is None else ()
+    maps = attempt(lambda: maps_in(log, topics)) if topics else None
+    fixed = frame or (maps.frame if maps else "") or _MAP_FRAME
     context = Context(log, tree, fixed, namespace or "")
     poses = attempt(lambda: poses_of(_first(tables, "odometry"), context))
     forces = _first(tables, "wrench")
@@ -94,17 +96,19 @@ def in_one_frame(
     wrench = attempt(lambda: wrench_of(forces, context, base, wrench_frame)) if forces and base else None
     people_t_ns, people, lost_people = people_of(tables.get("people", ()), context)
     goal_t_ns, goal_m, lost_goals = goals_of(_first(tables, "goal"), context)
-    placed_map = attempt(lambda: occupancy_of(map_and_frame, context)) if map_and_frame else None
+    history = attempt(lambda: placed_maps(maps, context)) if maps else None
     return Placed(
         context=context,
         poses=poses[0] if poses else None,
         wrench=wrench[0] if wrench else None,
-        occupancy=placed_map,
+        occupancy=occupancy if history is None else history.occupancy(len(history.sheets) - 1),
+        maps=history if history is not None and len(history.sheets) > 1 else None,
         goal_t_ns=goal_t_ns,
         goal_m=goal_m,
         people_t_ns=people_t_ns,
         people=people,
         findings=(
+            *(maps.findings if maps else ()),
             *_about_tf(tree, _start_ns(tables)),
             *(poses[1] if poses else ()),
             *(wrench[1] if wrench else ()),

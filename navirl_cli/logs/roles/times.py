@@ -21,14 +21,12 @@ _IN_ORDER: Final = ("odometry", "wrench")
 #: Roles whose messages count from their receipt on.
 _MOMENTARY: Final = ("goal", "joystick")
 #: Roles of which each message counts from its receipt on, whatever its stamps are.
-_RECEIVED: Final = ("tf_static",)
+_RECEIVED: Final = ("tf_static", "map")
 #: Roles whose messages show that a log goes on, from so many messages on.
 _REGULAR: Final = ("odometry", "wrench", "people", "joystick")
 _FEWEST: Final = 10
 #: How far ahead tf may be stamped, ns.
 _AHEAD_NS: Final = NS_PER_S
-#: Roles whose times nothing depends on.
-_TIMELESS: Final = ("map",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +101,6 @@ def without_repeats(columns: Columns) -> tuple[Columns, Findings]:
 
 def _timed(role: str, columns: Columns, clock: Clock) -> Columns:
     """One topic's messages on the clock."""
-    if role in _TIMELESS:
-        return columns
     if role in _RECEIVED:
         return columns.at(clock.times(Stamped(columns.topic, columns.t_ns, None)))
     if role == "tf":  # its stamps may lie ahead on purpose, but jump as the clock does

@@ -1,7 +1,7 @@
 """Which topic of a log serves which role: by its message type and, where that leaves several, by its name."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from navirl_cli.errors import LogError, unknown
@@ -34,6 +34,8 @@ class Role:
     remedy: str = ""
     #: Whether nothing can be extracted without it.
     needed: bool = False
+    #: Types of topics that belong to a chosen one, by what their name has behind its name.
+    companions: Mapping[str, MessageType] = field(default_factory=dict, hash=False)
     #: Whether topics of a preferred type are taken alone; otherwise topics of all types serve together.
     ranked: bool = True
 
@@ -44,7 +46,7 @@ class Role:
 
     def message_type(self, topic: Topic) -> MessageType:
         """The message type of a topic, as it serves this role."""
-        return next(one for one in self.message_types if one.name == topic.type_name)
+        return next(one for one in (*self.message_types, *self.companions.values()) if one.name == topic.type_name)
 
     def rank(self, topic: Topic) -> tuple[int, int] | None:
         """How well a topic fits, the smallest rank best; None where it serves only if the user names it."""
@@ -94,6 +96,7 @@ ROLES: Final = (
         "give the map's file with `map`, or record it, usually /map; it is latched, so that ros2 bag needs its "
         "transient-local QoS override",
         needed=True,
+        companions={"_updates": message_types.MAP_UPDATES},
     ),
     Role(
         "people",
@@ -178,8 +181,24 @@ def choose(
     if namespace is not None:
         own, shared = of_robot(log, {name: topic.type_name for name, topic in topics.items()}, namespace)
         preferred = [own, shared]
-    choices = {role.name: _choice(log, role, topics, requested.get(role.name, ()), preferred) for role in ROLES}
+    choices = {
+        role.name: _with_companions(_choice(log, role, topics, requested.get(role.name, ()), preferred), topics)
+        for role in ROLES
+    }
     return _with_own_tf(topics, choices, requested)
+
+
+def _with_companions(choice: Choice, topics: Mapping[str, Topic]) -> Choice:
+    """A choice with the topics that belong to the chosen ones."""
+    more = [
+        topics[name]
+        for topic in choice.topics
+        for ending, message_type in choice.role.companions.items()
+        if (name := f"{topic.name}{ending}") in topics
+        and topics[name].type_name == message_type.name
+        and topics[name].count
+    ]
+    return replace(choice, topics=(*choice.topics, *more)) if more else choice
 
 
 def _with_own_tf(
