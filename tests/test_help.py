@@ -48,6 +48,7 @@ def folder(tmp_path_factory):
         (folder / "logs" / log.name).symlink_to(log)
     files = forge.participant()
     (folder / "runs.tar.gz").write_bytes(forge.archive({f"runs/p1/{name}": data for name, data in files.items()}))
+    (folder / "trials.csv").write_text(CliRunner().invoke(cli, ["inspect", str(SAMPLES[0]), "--trials"]).stdout)
     fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -80,7 +81,7 @@ def test_every_option_stands_in_a_section(words, command):
     assert len(set(sections)) == len(sections)
     assert re.search(r"\nHelp:\n +-h, --help .*\n\nExamples:", text)
     for option in options(command):
-        assert len(re.findall(rf"^  (-\w, )?{option.opts[-1]}\b", text, re.MULTILINE)) == 1
+        assert len(re.findall(rf"^  (-\w, )?{option.opts[-1]}(?![\w-])", text, re.MULTILINE)) == 1
 
 
 @pytest.mark.parametrize(("words", "command"), EVERY)
@@ -110,6 +111,7 @@ def marked(line):
 #: Words after which each command prints its table, but for those that print only the name of a file.
 TABLES = {
     "inspect": ["p01.mcap"],
+    "annotate": ["p01.mcap", "trials.csv", "-o", "new.mcap"],
     "extract": ["p01.mcap", "-o", "new.json"],
     "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
     "evaluate": ["demos.json"],

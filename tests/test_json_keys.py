@@ -27,6 +27,8 @@ WITHOUT = {
         "demonstrations",
         "paths",
         "trials",
+        "trial",
+        "labelled",
         "messages",
         "gaps",
         "cells",
@@ -158,9 +160,12 @@ def test_numbers_of_what_commands_print_have_their_unit_in_their_key(navirl, tmp
     (tmp_path / "runs" / "p1").mkdir(parents=True)
     for name, data in forge.participant().items():
         (tmp_path / "runs" / "p1" / name).write_bytes(data)
+    (tmp_path / "trials.csv").write_text(navirl("inspect", log, "--trials").stdout)
     for words, data in (
         (("inspect", log), ()),
         (("extract", log, "-o", "demos.json"), ()),
+        (("inspect", log, "--trials"), ()),
+        (("annotate", log, "trials.csv", "-o", "copy.mcap"), ()),
         (("extract", log, "-o", "gain.json", "--gain"), ()),
         (("import-study", "runs", "-o", "logs"), {"completion_s"}),
     ):

@@ -35,6 +35,8 @@ _CLOCKS: Final = ("odometry", "wrench", "tf")
 _SAMPLED: Final = 8
 _STAMP: Final = "header.stamp"
 _TF_STAMP: Final = message_types.TF.fields[_STAMP]
+#: A topic and the full name of one of its types.
+_Key = tuple[str, str]
 _TRANSFORMS: Final = message_types.TF.sequence or ""
 
 
@@ -92,18 +94,29 @@ class Overview:
     @property
     def refusals(self) -> tuple[str, ...]:
         """Why extract refuses the log although each needed role has a topic, in words."""
-        return () if self.needed else tuple(dict.fromkeys(map(str, self.line.refusals)))
+        if self._missing:
+            return ()
+        reasons = [str(one) for one in self.line.refusals]
+        if self.line.recording is not None and self.line.recording.no_goal:
+            reasons.append(self.line.recording.goal_problem)
+        return tuple(dict.fromkeys(reasons))
 
     @property
     def reference_s(self) -> float:
         """Stamps - times of receipt of the topic whose clock counts, s; 0 where none is known."""
-        names = [topic.name for role in _CLOCKS for topic in self.choices[role].topics]
-        offsets = [flow.offset_s for name in names for flow in self.flows if flow.topic.name == name]
+        topics = [topic for role in _CLOCKS for topic in self.choices[role].topics]
+        offsets = [flow.offset_s for topic in topics for flow in self.flows if flow.topic == topic]
         return next((offset for offset in offsets if offset is not None), 0.0)
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """The roles that extract needs and the log does not serve."""
+        """The roles that extract needs and the log does not serve; goals too, at which it splits trials by default."""
+        no_goal = self.line.recording is not None and bool(self.line.recording.goal_problem)
+        return (*self._missing, "goal") if no_goal else self._missing
+
+    @property
+    def _missing(self) -> tuple[str, ...]:
+        """The needed roles without a topic."""
         return tuple(role for role, choice in self.choices.items() if is_missing(choice, self.choices))
 
 
@@ -150,19 +163,26 @@ def overview(
 
 
 def _flows(
-    timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], start_ns: int, stamped: Mapping[str, Stamped]
+    timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], start_ns: int, stamped: Mapping[_Key, Stamped]
 ) -> tuple[Flow, ...]:
     """When the messages of each topic came in, by the times of receipt of each file's channels."""
-    times: dict[str, list[IntArray]] = {}
-    encodings: dict[str, str] = {}
+    times: dict[_Key, list[IntArray]] = {}
+    encodings: dict[_Key, str] = {}
     for one, by_channel in timed:
         for channel in one.channels:
-            times.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
-            encodings[channel.topic] = channel.message_encoding
+            key = _key(channel)
+            times.setdefault(key, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+            encodings[key] = channel.message_encoding
+    topics = {(topic.name, topic.type_name): topic for topic in topics_of(one for one, _ in timed)}
     return tuple(
-        _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start_ns, stamped.get(name))
-        for name, topic in topics_of(one for one, _ in timed).items()
+        _flow(topic, encodings[key], np.sort(np.concatenate(times[key])), start_ns, stamped.get(key))
+        for key, topic in topics.items()
     )
+
+
+def _key(channel: Channel) -> _Key:
+    """The topic that a channel belongs to."""
+    return channel.topic, full_name(channel.schema_name)
 
 
 def _flow(topic: Topic, encoding: str, t_ns: IntArray, start_ns: int, stamped: Stamped | None) -> Flow:
@@ -193,10 +213,10 @@ def _offset_s(stamped: Stamped) -> float | None:
     return float(np.median(offset_ns) / NS_PER_S)
 
 
-def _first_messages(files: Sequence[RawFile]) -> dict[str, Stamped]:
+def _first_messages(files: Sequence[RawFile]) -> dict[_Key, Stamped]:
     """Stamps by topic in the first chunks of a recording, of transforms those of each message's first."""
     decoders: dict[Channel, Decoder | None] = {}
-    parts: dict[str, list[DecodedBatch]] = {}
+    parts: dict[_Key, list[DecodedBatch]] = {}
 
     def wanted(channel: Channel) -> bool:
         if channel not in decoders:
@@ -212,8 +232,8 @@ def _first_messages(files: Sequence[RawFile]) -> dict[str, Stamped]:
             if decoder is not None:
                 part = decoder.decode(batch)
                 if len(part.order):
-                    parts.setdefault(batch.channel.topic, []).append(part)
-    return {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
+                    parts.setdefault(_key(batch.channel), []).append(part)
+    return {key: one for key, some in parts.items() if (one := _stamped(key[0], some)) is not None}
 
 
 def _decoder(channel: Channel) -> Decoder | None:

@@ -1,5 +1,6 @@
 """The stage of time: all tables of a recording on one clock."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -51,13 +52,14 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
     Raises:
         LogError: There are no messages whose stamps could be the clock.
     """
-    reference = next((one for role in _REFERENCES for one in tables.get(role, ())), None)
-    if reference is None:
+    references = [one.stamped() for role in _REFERENCES for one in tables.get(role, ())]
+    references += [_most_frequent(one) for one in tables.get("tf", ()) if len(one.owner)]
+    if not references:
         raise LogError(
-            f"{log}: expected odometry or a wrench, whose stamps are the recording's clock, found neither; "
+            f"{log}: expected odometry, a wrench or tf, whose stamps are the recording's clock, found none of them; "
             "name the odometry with `topic` odometry=/name"
         )
-    clock = Clock(reference.stamped(), source)
+    clock = Clock(references[0], source)
     findings = [*_described(clock)]
     timed: dict[str, list[Columns]] = {}
     for role, several in tables.items():
@@ -107,6 +109,14 @@ def _timed(role: str, columns: Columns, clock: Clock) -> Columns:
         name = "header.stamp"
         return columns.at(columns.t_ns, **{name: clock.shifted(columns[name], columns.t_ns[columns.owner])})
     return columns.at(clock.times(columns.stamped(momentary=role in _MOMENTARY)))
+
+
+def _most_frequent(tf: Columns) -> Stamped:
+    """The stamps of the frame that tf places most often, which is the robot's: localisation corrects less often."""
+    children = tf["child_frame_id"]
+    child = Counter(children.tolist()).most_common(1)[0][0]
+    rows = np.flatnonzero(children == child)
+    return Stamped(tf.topic, tf.t_ns[tf.owner][rows], tf["header.stamp"][rows])
 
 
 def _described(clock: Clock) -> Findings:

@@ -4,21 +4,44 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from navirl_cli.errors import LogError, unknown
+from navirl_cli.errors import MOST_NAMES, LogError, unknown
+from navirl_cli.logs.container.batches import Channel
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.messages.reader import Contents
-from navirl_cli.logs.messages.schema import full_name
+from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
 from navirl_cli.logs.roles.namespaces import is_within, of_robot, owned_tf, robots_in
 
+#: Before the list of a log's topics in a message.
+HOLDS: Final = "; the log holds "
+#: Most message types of a role that a message lists.
+_MOST_TYPES: Final = 7
+
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a recording, over all its files and channels."""
+    """The messages of one type on a topic of a recording, over all its files and channels."""
 
     name: str
     type_name: str
     count: int
+    #: Channels of all files, whose definitions may differ.
+    channels: tuple[Channel, ...] = field(default=(), compare=False, repr=False)
+
+    def has(self, paths: Iterable[str]) -> bool:
+        """Whether its definition has these fields; False where it does not parse."""
+        for channel in self.channels[:1]:
+            try:
+                schema = parse_definition(
+                    channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding
+                )
+                for path in paths:
+                    schema.leaf(path)
+            except SchemaError:
+                return False
+        return True
 
 
 @dataclass(frozen=True)
@@ -45,8 +68,10 @@ class Role:
         return any(one.joined for one in self.message_types)
 
     def message_type(self, topic: Topic) -> MessageType:
-        """The message type of a topic, as it serves this role."""
-        return next(one for one in (*self.message_types, *self.companions.values()) if one.name == topic.type_name)
+        """The message type of a topic, as it serves this role: where releases differ, the first that fits."""
+        known = (*self.message_types, *self.companions.values())
+        named = [one for one in known if one.name == topic.type_name]
+        return next((one for one in named[:-1] if topic.has(one.fields.values())), named[-1])
 
     def rank(self, topic: Topic) -> tuple[int, int] | None:
         """How well a topic fits, the smallest rank best; None where it serves only if the user names it."""
@@ -141,28 +166,47 @@ def short_name(type_name: str) -> str:
     return type_name.replace("/msg/", "/")
 
 
-def topics_of(contents: Iterable[Contents]) -> dict[str, Topic]:
-    """The topics of the files of a recording by name; of several types on one topic the one with most messages."""
+def topics_of(contents: Iterable[Contents]) -> tuple[Topic, ...]:
+    """The topics of the files of a recording by name; a topic of several types stands once for each."""
     counts: dict[tuple[str, str], int] = {}
+    channels: dict[tuple[str, str], list[Channel]] = {}
     for one in contents:
         for channel in one.channels:
             key = (channel.topic, full_name(channel.schema_name))
             counts[key] = counts.get(key, 0) + one.counts.get(channel.id, 0)
-    found: dict[str, Topic] = {}
-    for (name, type_name), count in sorted(counts.items()):
-        if name not in found or count > found[name].count:
-            found[name] = Topic(name, type_name, count)
-    return found
+            channels.setdefault(key, []).append(channel)
+    return tuple(Topic(*key, count, tuple(channels[key])) for key, count in sorted(counts.items()))
+
+
+def shared_topics(topics: Iterable[Topic], chosen: Mapping[str, "Choice"]) -> Findings:
+    """The topics that serve a role and hold other types besides."""
+    of_name: dict[str, list[Topic]] = {}
+    for topic in topics:
+        if topic.count:
+            of_name.setdefault(topic.name, []).append(topic)
+    used: dict[str, dict[str, None]] = {}
+    for topic in (topic for choice in chosen.values() for topic in choice.topics):
+        used.setdefault(topic.name, {})[short_name(topic.type_name)] = None
+    return tuple(
+        Finding(
+            Kind.SEVERAL_TYPES,
+            name,
+            detail=f"{', '.join(f'{short_name(one.type_name)} ({one.count})' for one in of_name[name])}; used: "
+            + ", ".join(types),
+        )
+        for name, types in used.items()
+        if len(of_name.get(name, ())) > 1
+    )
 
 
 def choose(
-    log: str, topics: Mapping[str, Topic], requested: Mapping[str, Sequence[str]], namespace: str | None = None
+    log: str, topics: Sequence[Topic], requested: Mapping[str, Sequence[str]], namespace: str | None = None
 ) -> dict[str, Choice]:
     """Choose the topics of every role.
 
     Args:
         log: The recording's name, for messages.
-        topics: Of the recording, by name.
+        topics: Of the recording.
         requested: Names of topics by role, where the user named some.
         namespace: Of the robot, where the user named it: its own topics serve before those that no robot owns, and
             those of other robots never.
@@ -177,9 +221,9 @@ def choose(
     for name in requested:
         if name not in names:
             raise LogError(unknown("`topic`", name, names))
-    preferred = [set(topics)]
+    preferred = [{one.name for one in topics}]
     if namespace is not None:
-        own, shared = of_robot(log, {name: topic.type_name for name, topic in topics.items()}, namespace)
+        own, shared = of_robot(log, {one.name: one.type_name for one in topics}, namespace)
         preferred = [own, shared]
     choices = {
         role.name: _with_companions(_choice(log, role, topics, requested.get(role.name, ()), preferred), topics)
@@ -188,21 +232,19 @@ def choose(
     return _with_own_tf(topics, choices, requested)
 
 
-def _with_companions(choice: Choice, topics: Mapping[str, Topic]) -> Choice:
+def _with_companions(choice: Choice, topics: Sequence[Topic]) -> Choice:
     """A choice with the topics that belong to the chosen ones."""
-    more = [
-        topics[name]
+    wanted = {
+        (f"{topic.name}{ending}", message_type.name)
         for topic in choice.topics
         for ending, message_type in choice.role.companions.items()
-        if (name := f"{topic.name}{ending}") in topics
-        and topics[name].type_name == message_type.name
-        and topics[name].count
-    ]
+    }
+    more = [one for one in topics if one.count and (one.name, one.type_name) in wanted]
     return replace(choice, topics=(*choice.topics, *more)) if more else choice
 
 
 def _with_own_tf(
-    topics: Mapping[str, Topic], choices: dict[str, Choice], requested: Mapping[str, Sequence[str]]
+    topics: Sequence[Topic], choices: dict[str, Choice], requested: Mapping[str, Sequence[str]]
 ) -> dict[str, Choice]:
     """The choices without the tf topics of other robots."""
     roles = [name for name in ("tf", "tf_static") if name not in requested]
@@ -210,7 +252,9 @@ def _with_own_tf(
     references = [topic.name for name in ("odometry", "wrench", "map") for topic in choices[name].topics]
     odometry = choices["odometry"].role
     types = {one.name for one in odometry.message_types}
-    others = [one.name for one in topics.values() if one.type_name in types and one.name not in references]
+    others = [one.name for one in topics if one.type_name in types and one.name not in references]
+    if any(choices[name].ambiguous for name in ("odometry", "wrench")):
+        return choices  # which the user must choose first
     owned = owned_tf(tf, references, others)
     for name in roles:
         choice = choices[name]
@@ -228,14 +272,14 @@ def _with_own_tf(
 
 
 def _choice(
-    log: str, role: Role, topics: Mapping[str, Topic], requested: Sequence[str], preferred: Sequence[set[str]]
+    log: str, role: Role, topics: Sequence[Topic], requested: Sequence[str], preferred: Sequence[set[str]]
 ) -> Choice:
     """The topics of one role.
 
     Args:
         log: The recording's name.
         role: What is needed.
-        topics: Of the recording, by name.
+        topics: Of the recording.
         requested: Names of topics that the user named.
         preferred: Sets of topics, the best first; where one holds a topic that serves, the later ones do not count.
             tf, of which a robot has its own and shares /tf, takes from all of them.
@@ -247,7 +291,7 @@ def _choice(
             raise LogError(f"{log}: `topic` {role.name}: expected one topic, found {names}; choose one")
         return Choice(role, named, "named by `topic`")
     types = {one.name for one in role.message_types}
-    of_type = [one for one in topics.values() if one.type_name in types and any(one.name in some for some in preferred)]
+    of_type = [one for one in topics if one.type_name in types and any(one.name in some for some in preferred)]
     ranks = {topic: rank for topic in of_type if topic.count and (rank := role.rank(topic)) is not None}
     if role.name not in ("tf", "tf_static"):
         within = ({topic: rank for topic, rank in ranks.items() if topic.name in some} for some in preferred)
@@ -263,11 +307,11 @@ def _choice(
     return Choice(role, best, reason + (f"; skipped by name: {', '.join(skipped)}" if skipped else ""))
 
 
-def _several(role: Role, best: Sequence[Topic], topics: Mapping[str, Topic]) -> str:
+def _several(role: Role, best: Sequence[Topic], topics: Sequence[Topic]) -> str:
     """The problem that several topics fit equally well, and how to choose one."""
     names = ", ".join(topic.name for topic in best)
     shown = ", ".join(sorted({short_name(topic.type_name) for topic in best}))
-    robots = robots_in({name: topic.type_name for name, topic in topics.items()})
+    robots = robots_in({one.name: one.type_name for one in topics})
     own = [one for one in robots if any(is_within(topic.name, one) for topic in best)]
     robot = f", or the robot with `namespace` {own[0]}" if own else ""
     return (
@@ -276,23 +320,32 @@ def _several(role: Role, best: Sequence[Topic], topics: Mapping[str, Topic]) -> 
     )
 
 
-def _requested(log: str, role: Role, topics: Mapping[str, Topic], name: str) -> Topic:
+def _requested(log: str, role: Role, topics: Sequence[Topic], name: str) -> Topic:
     """A topic that the user named."""
     types = [one.name for one in role.message_types]
-    topic = topics.get(name)
-    if topic is not None and topic.type_name in types:
-        return topic
+    named = [topic for topic in topics if topic.name == name]
+    served = sorted((one for one in named if one.type_name in types), key=lambda one: types.index(one.type_name))
+    if served:
+        return served[0]
+    topic = next(iter(named), None)
     field = f"{log}: `topic` {role.name}"
-    fitting = [one.name for one in topics.values() if one.type_name in types]
+    fitting = [one.name for one in topics if one.type_name in types]
     if topic is None and fitting:
         raise LogError(unknown(field, name, fitting))
     found = repr(name) if topic is None else f"{name!r} of type {short_name(topic.type_name)}"
-    raise LogError(f"{field}: expected a topic of type {' or '.join(map(short_name, types))}, found {found}")
+    raise LogError(f"{field}: expected a topic of type {_types(role)}, found {found}")
+
+
+def _types(role: Role) -> str:
+    """The message types of a role, of many the first ones."""
+    names = list(dict.fromkeys(short_name(one.name) for one in role.message_types))
+    more = f" or {len(names) - _MOST_TYPES} others" if len(names) > _MOST_TYPES + 1 else ""
+    return " or ".join(names[:_MOST_TYPES] if more else names) + more
 
 
 def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     """Why a role has no topic, and what to do."""
-    types = " or ".join(short_name(one.name) for one in role.message_types)
+    types = _types(role)
     empty = [topic.name for topic in of_type if not topic.count]
     unlikely = [topic.name for topic in of_type if topic.count]
     notes = f"; {', '.join(empty)} has no messages" if empty else ""
@@ -301,11 +354,25 @@ def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     return f"no {role.name}: expected a topic of type {types}{notes}" + (f"; {role.remedy}" if role.remedy else "")
 
 
-def refusal(log: str, topics: Mapping[str, Topic], choice: Choice) -> LogError:
+def undefined(log: str, topics: Sequence[Topic]) -> LogError | None:
+    """The error that nothing in a log can be decoded, because no topic has a definition."""
+    channels = [channel for topic in topics if topic.count for channel in topic.channels]
+    if not channels or not all(map(lacks_definition, channels)):
+        return None
+    return LogError(
+        f"{log}: none of its {len(topics)} topics has a definition of its messages, so that nothing can be decoded; "
+        "convert it on a computer that has the message packages, for example with ros2 bag convert"
+    )
+
+
+def refusal(log: str, topics: Sequence[Topic], choice: Choice) -> LogError:
     """The error that a log lacks a needed topic."""
     if not topics:
         return LogError(
             f"{log}: holds no messages: the file ends before the first one; copy it again, or use another recording"
         )
-    listed = ", ".join(f"{topic.name} ({short_name(topic.type_name)})" for topic in topics.values())
-    return LogError(f"{log}: {choice.problem}; the log holds {listed}")
+    names = [f"{topic.name} ({short_name(topic.type_name)})" for topic in topics]
+    listed = ", ".join(names[:MOST_NAMES])
+    if len(names) > MOST_NAMES:
+        listed += f" and {len(names) - MOST_NAMES} more"
+    return LogError(f"{log}: {choice.problem}{HOLDS}{listed}")
