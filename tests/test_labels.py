@@ -56,7 +56,10 @@ def test_a_row_states_everything_of_its_trial(log, table):
     assert first.people_m.tolist() == [[1, 1], [2, -1.25]]
     assert first.nominal_m.tolist() == [[0, 0], [1, 0.5], [4, 0]]
     assert (second.id, second.condition.value, second.cycle, second.set) == ("bert/2", "force", 1, None)
-    assert second.notes[-1] == "nobody was there, as stated"
+    assert second.notes[-2:] == (
+        "people by people_m: 0; in the log: 1; those of the log are ignored",
+        "nobody was there",
+    )
     assert (len(second.people_m), second.nominal_m, second.robot_radius_m) == (0, None, 0.25)
 
 
@@ -377,3 +380,12 @@ def test_many_trials_take_time_in_proportion(tmp_path):
         if near is not None and abs(near.t_ns - starts[number]) < length:
             expected[number] = near
     assert entries_by_trial(entries, recording, trials) == expected
+
+
+def test_people_of_a_table_are_checked_as_those_of_the_option(log, table):
+    found = demos(table('start_s,people_m\n1.5,"1,0.9"\n7,"3,0.1"\n'), log)
+    first, second = found.demonstrations()
+    assert "people_m 1.00,0.90 contradicts the log, whose nearest person is 1.00 m from there" in " ".join(first.notes)
+    assert "the robot drove through people_m 3.00,0.10" in " ".join(second.notes)
+    (lost,) = demos(table('start_s,people_m\n1.5,"2,0.9"\n7,"4,0"\n'), log).lost
+    assert "trial 2: people_m 4.00,0.00 stands where the path ends" in lost

@@ -75,13 +75,13 @@ def check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
             )
 
 
-def check_end(people: FloatArray, end: FloatArray, radius_m: float) -> None:
+def check_end(people: FloatArray, end: FloatArray, radius_m: float, by: str) -> None:
     """Refuse a person whom the user places where the robot ended."""
     for x, y in people:
         distance = float(np.hypot(x - end[0], y - end[1]))
         if distance < radius_m:
             raise DemonstrationError(
-                f"`person` {x:.2f},{y:.2f} stands where the path ends, which is its goal ({distance:.2f} m from the "
+                f"{by} {x:.2f},{y:.2f} stands where the path ends, which is its goal ({distance:.2f} m from the "
                 f"robot's centre, radius {radius_m:.2f} m); correct the place"
             )
 
@@ -166,7 +166,7 @@ def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
     return [f"the localisation {how} by {largest.size_m:.2f} m at {(largest.t_ns - start_ns) / 1e9:.1f} s"]
 
 
-def placed_notes(given: FloatArray, logged: FloatArray | None, xy_m: FloatArray, radius_m: float) -> list[str]:
+def placed_notes(given: FloatArray, logged: FloatArray | None, xy_m: FloatArray, radius_m: float, by: str) -> list[str]:
     """What contradicts the people whom the user placed.
 
     Args:
@@ -174,32 +174,33 @@ def placed_notes(given: FloatArray, logged: FloatArray | None, xy_m: FloatArray,
         logged: (q, 2) m, those of the log in this trial; None where it has no messages about people.
         xy_m: (n, 2) m, the driven path.
         radius_m: The robot's.
+        by: The argument or column that places them.
     """
     notes = []
     for person in given:
         nearest_m = float(np.hypot(*(xy_m - person).T).min())
         if nearest_m < radius_m:
             notes.append(
-                f"the robot drove through {_at(person)}: its centre passed {nearest_m:.2f} m from there, radius "
+                f"the robot drove through {_at(person, by)}: its centre passed {nearest_m:.2f} m from there, radius "
                 f"{radius_m:.2f} m; correct the place"
             )
     if logged is None:
         return notes
     if len(given) != len(logged):
-        notes.append(f"people by `person`: {len(given)}; in the log: {len(logged)}; those of the log are ignored")
+        notes.append(f"people by {by}: {len(given)}; in the log: {len(logged)}; those of the log are ignored")
     for person in given if len(logged) else ():
         away_m = np.hypot(*(logged - person).T)
         x, y = logged[int(away_m.argmin())]
         if away_m.min() > SAME_PLACE_M:
             notes.append(
-                f"{_at(person)} contradicts the log, whose nearest person is {away_m.min():.2f} m from there, at x "
+                f"{_at(person, by)} contradicts the log, whose nearest person is {away_m.min():.2f} m from there, at x "
                 f"{x:.2f} m, y {y:.2f} m; the log's people are ignored"
             )
     return notes
 
 
-def _at(person: FloatArray) -> str:
-    return f"`person` {person[0]:.2f},{person[1]:.2f}"
+def _at(person: FloatArray, by: str) -> str:
+    return f"{by} {person[0]:.2f},{person[1]:.2f}"
 
 
 def people_notes(recording: Recording, occupancy: Occupancy, people: FloatArray) -> list[str]:

@@ -270,19 +270,18 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
 def _people(
     recording: Recording, settings: ExtractSettings, declared: Declared, trial: Trial, occupancy: Occupancy
 ) -> People:
-    """The people of a trial, with notes: those placed by the user, else those that were stated, else the log's."""
+    """The people of a trial: those placed by the user, else by labels, with what contradicts them; else the log's."""
     xy, radius_m = recording.xy_m[trial.first : trial.stop], _radius_m(recording, settings)
     logged = people_during(recording, int(recording.t_ns[trial.first]), int(recording.t_ns[trial.stop - 1]))
+    by = "`person`" if settings.people_m is not None else "people_m"
     placed = declared.people_m if settings.people_m is None else np.array(settings.people_m)
     if placed is None:
-        people = logged
-    elif len(placed):
-        check_end(placed, xy[-1], radius_m)
-        known = logged.people_m if len(recording.people_t_ns) else None
-        people = People(placed, notes=tuple(placed_notes(placed, known, xy, radius_m)))
-    else:
-        return People(placed, notes=("nobody was there, as stated",))
-    return replace(people, notes=(*people.notes, *people_notes(recording, occupancy, people.people_m)))
+        return replace(logged, notes=(*logged.notes, *people_notes(recording, occupancy, logged.people_m)))
+    check_end(placed, xy[-1], radius_m, by)
+    known = logged.people_m if len(recording.people_t_ns) else None
+    notes = placed_notes(placed, known, xy, radius_m, by)
+    own = people_notes(recording, occupancy, placed) if len(placed) else ["nobody was there"]
+    return People(placed, notes=(*notes, *own))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

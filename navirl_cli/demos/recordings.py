@@ -109,18 +109,6 @@ def extract_recordings(
     )
 
 
-def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
-    """Each reason once, with the log or the number of logs that it concerns; the commonest first."""
-    logs: dict[str, list[str]] = {}
-    for error in failed:
-        log, colon, reason = str(error).partition(": ")
-        # of the topics that a log holds, another log may hold others
-        key = (reason if colon else log).partition(HOLDS)[0]
-        logs.setdefault(key, []).append(log if colon else "")
-    ordered = sorted(logs.items(), key=lambda item: -len(item[1]))
-    return [f"{own[0] if len(own) == 1 else f'{len(own)} logs'}: {reason}" for reason, own in ordered]
-
-
 def _rows(
     labels: Labels | None, sources: Sequence[Source], settings: ExtractSettings
 ) -> tuple[list[tuple[Label, ...]], list[str]]:
@@ -131,6 +119,18 @@ def _rows(
     radius, people = ("robot_radius", settings.robot_radius_m), ("person", settings.people_m)
     check_agreement(labels, {**stated, "robot_radius_m": radius, "people_m": people})
     return labels_by_source(labels, sources)
+
+
+def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
+    """Each reason once, with the log or the number of logs that it concerns; the commonest first."""
+    logs: dict[str, list[str]] = {}
+    for error in failed:
+        log, colon, reason = str(error).partition(": ")
+        # of the topics that a log holds, another log may hold others
+        key = (reason if colon else log).partition(HOLDS)[0]
+        logs.setdefault(key, []).append(log if colon else "")
+    ordered = sorted(logs.items(), key=lambda item: -len(item[1]))
+    return [f"{own[0] if len(own) == 1 else f'{len(own)} logs'}: {reason}" for reason, own in ordered]
 
 
 def _counted(
