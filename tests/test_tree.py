@@ -281,7 +281,7 @@ def test_a_fixed_frame_that_is_mounted_elsewhere_moves_when_that_is_sent():
 def test_a_missing_link_names_what_was_ignored():
     zero = Link("map", "odom", np.arange(1, 6) * S, np.zeros((5, 3)), np.zeros((5, 4)))
     with pytest.raises(
-        FrameError, match=r"found no frames; ignored: map -> odom \(5 with a quaternion of zeros\); odom"
+        FrameError, match=r"found no frames; ignored: map -> odom \(5 with a quaternion of zeros\); record"
     ):
         TransformTree([], [zero]).lookup("map", "odom", [S])
 

@@ -12,11 +12,12 @@ from shared_cases import case
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, demonstrations_of, read_demonstrations
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands.study import _given
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import DemonstrationError, TruncatedError
 from navirl_cli.irl.selection import select
-from navirl_cli.logs.load import load_recording
+from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.reports.fit import remarks
 from navirl_cli.reports.repeated import repeated
 
@@ -150,6 +151,9 @@ def of(name, **changes):
 DRIVEN = demonstration(open_grid(6, 4), [(1, 1), (2, 1), (3, 1)])
 
 
+CUT = of("a/2", truncated=True, warnings=("the clock steps back",), notes=("truncated: poses are missing",))
+
+
 def test_fit_leaves_truncated_trials_out_unless_asked():
     whole, cut = of("a/1"), of("a/2", truncated=True)
     assert [one.id for one in select([whole, cut]).demonstrations] == ["a/1"]
@@ -158,8 +162,15 @@ def test_fit_leaves_truncated_trials_out_unless_asked():
         select([cut])
 
 
+def test_a_study_leaves_truncated_trials_of_a_file_out(tmp_path):
+    write_json(tmp_path / "d.json", "demonstrations", demonstrations_document([of("a/1"), CUT], [], {}), force=False)
+    given = _given([tmp_path / "d.json"], LoadOptions())
+    assert [one.id for one in given.demonstrations] == ["a/1"]
+    assert given.lost == ["left out: a/2 is cut off"]
+
+
 def test_warnings_and_the_mark_are_kept_in_the_file(tmp_path):
-    cut = of("a/2", truncated=True, warnings=("the clock steps back",), notes=("truncated: poses are missing",))
+    cut = CUT
     document = demonstrations_document([cut], [], {})
     write_json(tmp_path / "demos.json", "demonstrations", document, force=False)
     (read,) = read_demonstrations(tmp_path / "demos.json")

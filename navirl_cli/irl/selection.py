@@ -63,7 +63,7 @@ def select(
     if demonstrations and not chosen:
         raise _not_among(demonstrations, conditions, cycle)
     if not truncated:
-        chosen = _whole(chosen)
+        chosen = whole(chosen)
     if only_corrected:
         chosen = _corrected(chosen)
     masks = None
@@ -87,15 +87,19 @@ def _not_among(
     return DemonstrationError(unknown(" and ".join(arguments), ", ".join(asked), sorted(there)))
 
 
-def _whole(chosen: Sequence[Demonstration]) -> list[Demonstration]:
-    """Those that are not cut off."""
-    whole = [one for one in chosen if not one.truncated]
-    if chosen and not whole:
+def whole(chosen: Sequence[Demonstration]) -> list[Demonstration]:
+    """The demonstrations that are not cut off.
+
+    Raises:
+        DemonstrationError: All are.
+    """
+    kept = [one for one in chosen if not one.truncated]
+    if chosen and not kept:
         raise DemonstrationError(
             f"expected demonstrations that are whole, found {len(chosen)} that are cut off; extract logs with whole "
             "trials, or learn from these with `truncated`, where a last cell may be no goal"
         )
-    return whole
+    return kept
 
 
 def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:

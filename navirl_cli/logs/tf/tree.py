@@ -286,7 +286,8 @@ class TransformTree:
     def _refuse(self, target: str, source: str) -> NoReturn:
         """Raise the error of two frames that do not connect."""
         _parents_first({frame: self._curves(frame) for frame in self._above(source) | self._above(target)})
-        alone = [frame for frame in dict.fromkeys((source, target)) if frame not in self.frames]
+        named = {*self.frames, *(frame for pair in self.faults for frame in pair)}
+        alone = [frame for frame in dict.fromkeys((source, target)) if frame not in named]
         left_out = [
             f"{parent} -> {child} ({one})"
             for (parent, child), some in self.faults.items()
