@@ -18,6 +18,8 @@ from navirl_cli.demos.trials import Split
 from navirl_cli.errors import DemonstrationError, TruncatedError
 from navirl_cli.irl.selection import select
 from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.overview import overview
+from navirl_cli.logs.sources import Source
 from navirl_cli.reports.fit import remarks
 from navirl_cli.reports.repeated import repeated
 
@@ -128,6 +130,18 @@ def test_goals_after_the_last_pose_are_listed(extracted):
     found = extracted(log)
     assert len(found.demonstrations) == 1
     assert found.skipped == ("run.mcap: 2 goals were announced after the last pose, 12.9 s into the log",)
+
+
+@pytest.mark.parametrize(
+    ("spans", "sentence"),
+    [
+        ({"tf": [(0.0, 8.0)]}, "poses end 7.2 s before the other measurements; a trial that has not arrived"),
+        ({"odometry": [(5.0, 16.0)]}, "poses begin 5.0 s after the other measurements; a trial from before is cut off"),
+    ],
+)
+def test_inspect_says_that_poses_begin_late_or_end_early(tmp_path, spans, sentence):
+    path = forge.scene(Robot(**spans)).write(tmp_path / "run.mcap")
+    assert any(one.startswith(sentence) for one in overview(Source(path.name, (path,)), {}).findings)
 
 
 @pytest.mark.parametrize(("name", "driven_m"), [("odom_ends_early", 5.16), ("tf_ends", 5.57)])

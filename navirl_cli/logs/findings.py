@@ -73,6 +73,11 @@ class Kind(Enum):
     SEVERAL_PARENTS = (_NOTE, "tf gives {about!r} several parents in turn: {detail}")
     UNCOVERED_POSES = (_NOTE, "{count} poses lie outside the time that tf covers; left out")
     POSES_IN_GAPS = (_LOSS, "{count} poses lie in gaps of tf longer than {size:g} s; left out")
+    POSES_BEGIN_LATE = (_INFO, "poses begin {size:.1f} s after the other measurements; a trial from before is cut off")
+    POSES_END_EARLY = (
+        _INFO,
+        "poses end {size:.1f} s before the other measurements; a trial that has not arrived by then is cut off",
+    )
     POSES_FROM_TF = (_NOTE, "no odometry: poses are those of {about!r} in tf")
     BASE_ASSUMED = (
         _NOTE,

@@ -27,7 +27,7 @@ from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.findings import Finding, Findings, Kind, Severity, texts
 from navirl_cli.logs.messages.reader import Contents, Progress, scan
 from navirl_cli.logs.recording import Occupancy, Recording, Session
-from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.logs.roles.clocks import NS_PER_S, TimeSource
 from navirl_cli.logs.roles.commands import commands_of
 from navirl_cli.logs.roles.session import session_of
 from navirl_cli.logs.roles.space import Placed, in_one_frame
@@ -38,6 +38,10 @@ from navirl_cli.logs.sources import Source
 
 #: Where the damage of a topic begins in its sentence.
 _DAMAGE: Final = re.compile(r"^.*?: bytes \d+ to \d+: (topic \S+: )?")
+
+
+#: Poses that are missing for longer at the log's beginning or end are worth a word, s.
+_MISSING_S: Final = 1.0
 
 
 class Forces(StrEnum):
@@ -179,6 +183,7 @@ def follow(
         *shared_topics(topics, chosen),
         *(timed.findings if timed else ()),
         *(placed.findings if placed else ()),
+        *(_missing_poses(timed.tables, placed) if timed and placed else ()),
     )
     damage = source.damage if nothing else (*source.damage, *read.damage)
     lost = (*map(str, damage), *texts(log, findings, Severity.LOSS))
@@ -193,6 +198,17 @@ def follow(
     except NavirlError as error:
         refusals.append(error)
     return Line(choices, timed, placed, findings, lost, recording, tuple(refusals))
+
+
+def _missing_poses(tables: Tables, placed: Placed) -> Findings:
+    """That poses begin after or end before everything else."""
+    measured = measured_ns(tables)
+    if placed.poses is None or measured is None or not len(placed.poses.t_ns):
+        return ()
+    late_s = (int(placed.poses.t_ns[0]) - measured[0]) / NS_PER_S
+    early_s = (measured[1] - int(placed.poses.t_ns[-1])) / NS_PER_S
+    known = ((Kind.POSES_BEGIN_LATE, late_s), (Kind.POSES_END_EARLY, early_s))
+    return tuple(Finding(kind, "poses", size=size_s) for kind, size_s in known if size_s > _MISSING_S)
 
 
 def _with_foreign(refusal: NavirlError, foreign: Sequence[str]) -> NavirlError:
