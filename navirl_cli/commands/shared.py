@@ -38,6 +38,9 @@ topic_option = click.option(
     shell_complete=completion.topics,
     help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
 )
+namespace_option = click.option(
+    "--namespace", metavar="/ROBOT", help="The robot's namespace, in a log of several robots, e.g. /robot1."
+)
 frame_option = click.option("--frame", help="Frame of all results, instead of the map's frame.")
 split_option = click.option(
     "--split",

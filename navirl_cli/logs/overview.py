@@ -121,13 +121,19 @@ class Overview:
 
 
 def overview(
-    source: Source, requested: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
+    source: Source,
+    requested: Mapping[str, Sequence[str]],
+    namespace: str | None = None,
+    *,
+    check: bool = False,
+    progress: Progress | None = None,
 ) -> Overview:
     """What is in a recording.
 
     Args:
         source: Its files.
         requested: Names of topics by role, where the user named some.
+        namespace: Of the robot, where the user named it.
         check: Read every message, so that damage inside of chunks shows too.
         progress: Called with bytes done and bytes in all.
 
@@ -138,7 +144,9 @@ def overview(
         files = [stack.enter_context(open_log(path)) for path in source.files]
         timed = [message_times(file) for file in files]
         contents = tuple(one for one, _ in timed)
-        line = follow(source, files, contents, LoadOptions(topics=requested), None if check else progress)
+        line = follow(
+            source, files, contents, LoadOptions(topics=requested, namespace=namespace), None if check else progress
+        )
         stamped = _first_messages(files)
         damage = _all_damage(files, progress) if check else [note for one in contents for note in one.damage]
     starts = [one.start_ns for one in contents if one.start_ns is not None]

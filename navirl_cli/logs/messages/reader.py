@@ -11,6 +11,7 @@ from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import DecodedBatch
+from navirl_cli.logs.messages.packing import Packer
 from navirl_cli.logs.messages.schema import full_name
 from navirl_cli.logs.messages.series import Series, SeriesBuilder
 
@@ -106,7 +107,7 @@ def read(
     wants: Wants,
     progress: Progress | None = None,
     threads: int | None = None,
-    latest: Collection[TopicKey] = (),
+    packed: Collection[TopicKey] = (),
 ) -> ReadResult:
     """Read topics from one or several files.
 
@@ -116,7 +117,8 @@ def read(
             "poses[].position.x", which become columns.
         progress: Called with the bytes done and the bytes of all files.
         threads: Number of threads that decompress and decode; by default one for each core, four at most.
-        latest: Topics of which only the message received last is wanted, such as maps that are sent repeatedly.
+        packed: Topics whose sequences are int8 and are kept compressed by zlib, one object of bytes a message, such as
+            maps that are sent repeatedly.
 
     Returns:
         A series for each wanted topic that a file has, and the damage. Damage includes channels whose encoding,
@@ -129,7 +131,8 @@ def read(
     sizes = [_size(path) for path in files]
     fields: dict[TopicKey, tuple[str, ...]] = {key: tuple(paths) for key, paths in wants.items()}
     builders: dict[TopicKey, SeriesBuilder] = {
-        key: SeriesBuilder(key if isinstance(key, str) else key[0], key in latest) for key in fields
+        key: SeriesBuilder(key if isinstance(key, str) else key[0], Packer() if key in packed else None)
+        for key in fields
     }
     damage: list[Damage] = []
     begin = 0
@@ -200,12 +203,7 @@ class _Walk:
         """Walk over a file."""
         for decoded, count in log.results(self.wanted, self.decoded, threads):
             self.seen[decoded.channel.id] += count
-            key = self.key(decoded.channel)
-            batches = self.batches[key]
-            batches.append(decoded)
-            if self.builders[key].latest:
-                filled = [one for one in batches if len(one.order)]
-                batches[:] = sorted(filled, key=lambda one: int(one.log_time_ns.max()))[-1:] or batches
+            self.batches[self.key(decoded.channel)].append(decoded)
             progress(log.position / log.size)
         for channel in log.channels:
             self.wanted(channel)
@@ -223,9 +221,9 @@ class _Walk:
     def decoded(self, batch: Batch) -> tuple[DecodedBatch, int]:
         """A batch's columns, and its number of messages; in any thread."""
         builder = self.builders[self.key(batch.channel)]
-        decoder = builder.decoders[batch.channel]
-        newest = decoder.decode(batch.newest()) if builder.latest else None
-        decoded = newest if newest is not None and len(newest.order) else decoder.decode(batch)
+        decoded = builder.decoders[batch.channel].decode(batch)
+        if builder.packer is not None:
+            decoded = builder.packer.packed(decoded)
         return decoded, len(batch.starts)
 
     def undecodable(self, log: LogFile) -> list[str]:

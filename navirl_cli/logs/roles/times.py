@@ -21,8 +21,13 @@ _REFERENCES: Final = ("odometry", "wrench")
 _IN_ORDER: Final = ("odometry", "wrench")
 #: Roles whose messages count from their receipt on.
 _MOMENTARY: Final = ("goal", "joystick")
-#: Roles whose times nothing depends on.
-_TIMELESS: Final = ("map", "tf_static")
+#: Roles of which each message counts from its receipt on, whatever its stamps are.
+_RECEIVED: Final = ("tf_static", "map")
+#: Roles whose messages show that a log goes on, from so many messages on.
+_REGULAR: Final = ("odometry", "wrench", "people", "joystick")
+_FEWEST: Final = 10
+#: How far ahead tf may be stamped, ns.
+_AHEAD_NS: Final = NS_PER_S
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +71,19 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
     return Timed(timed, (*findings, *clock.findings))
 
 
+def measured_ns(tables: Tables) -> tuple[int, int] | None:
+    """First and last time of what was measured regularly, ns; None for nothing.
+
+    tf, whose stamps may lie ahead on purpose, counts with as much taken off at its end.
+    """
+    times = [one.t_ns for role in _REGULAR for one in tables.get(role, ()) if len(one) >= _FEWEST]
+    for one in tables.get("tf", ()):
+        stamps = one["header.stamp"]
+        if len(one) >= _FEWEST and len(stamps := stamps[stamps > 0]):
+            times.append(np.array([stamps.min(), stamps.max() - _AHEAD_NS]))
+    return (min(int(one.min()) for one in times), max(int(one.max()) for one in times)) if times else None
+
+
 def in_order(columns: Columns) -> tuple[Columns, Findings]:
     """The messages in order of time; of equal times in order of receipt."""
     late = int((np.diff(columns.t_ns) < 0).sum())
@@ -85,8 +103,8 @@ def without_repeats(columns: Columns) -> tuple[Columns, Findings]:
 
 def _timed(role: str, columns: Columns, clock: Clock) -> Columns:
     """One topic's messages on the clock."""
-    if role in _TIMELESS:
-        return columns
+    if role in _RECEIVED:
+        return columns.at(clock.times(Stamped(columns.topic, columns.t_ns, None)))
     if role == "tf":  # its stamps may lie ahead on purpose, but jump as the clock does
         name = "header.stamp"
         return columns.at(columns.t_ns, **{name: clock.shifted(columns[name], columns.t_ns[columns.owner])})
