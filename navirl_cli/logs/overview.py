@@ -23,6 +23,7 @@ from navirl_cli.logs.messages.reader import Contents, Progress, message_times
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
+from navirl_cli.logs.roles.receipts import wrong_receipts
 from navirl_cli.logs.roles.topics import Choice, Topic, is_missing, topics_of
 from navirl_cli.logs.sources import Source
 
@@ -128,32 +129,49 @@ def overview(
         line = follow(source, files, contents, LoadOptions(topics=requested), None if check else progress)
         stamped = _first_messages(files)
         damage = _all_damage(files, progress) if check else [note for one in contents for note in one.damage]
-    starts = [one.start_ns for one in contents if one.start_ns is not None]
-    ends = [one.end_ns for one in contents if one.end_ns is not None]
+    received = _received(timed, line)
+    start_ns = min((int(times[0]) for times in received.values() if len(times)), default=None)
     return Overview(
         source,
         contents,
-        min(starts, default=None),
-        max(ends, default=None),
-        _flows(timed, min(starts, default=0), stamped),
+        start_ns,
+        max((int(times[-1]) for times in received.values() if len(times)), default=None),
+        _flows(contents, received, start_ns or 0, stamped),
         line,
         tuple(dict.fromkeys((*map(str, (*source.damage, *damage)), *line.lost))),
     )
 
 
-def _flows(
-    timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], start_ns: int, stamped: Mapping[str, Stamped]
-) -> tuple[Flow, ...]:
-    """When the messages of each topic came in, by the times of receipt of each file's channels."""
-    times: dict[str, list[IntArray]] = {}
-    encodings: dict[str, str] = {}
+def _received(timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], line: Line) -> dict[str, IntArray]:
+    """By topic (n,) ns of receipt, ascending, without those that cannot be true, and without steps of the clock.
+
+    Where the recorder's clock stepped, other topics than those of extract count only within the times of these.
+    """
+    by_topic: dict[str, list[IntArray]] = {}
     for one, by_channel in timed:
         for channel in one.channels:
-            times.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
-            encodings[channel.topic] = channel.message_encoding
+            by_topic.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+    received = {topic: np.sort(np.concatenate(times)) for topic, times in by_topic.items()}
+    known = line.timed.received_ns if line.timed and line.timed.repaired else {}
+    if known:
+        first, last = min(int(times[0]) for times in known.values()), max(int(times[-1]) for times in known.values())
+        within = {topic: times[(times >= first) & (times <= last)] for topic, times in received.items()}
+        return {topic: known.get(topic, times) for topic, times in within.items()}
+    wrong = wrong_receipts(np.concatenate([np.zeros(0, dtype=np.int64), *received.values()]))
+    if wrong.all():
+        return received
+    parts = np.split(wrong, np.cumsum([len(times) for times in received.values()]))
+    return {topic: times[~part] for (topic, times), part in zip(received.items(), parts, strict=False)}
+
+
+def _flows(
+    contents: Sequence[Contents], received: Mapping[str, IntArray], start_ns: int, stamped: Mapping[str, Stamped]
+) -> tuple[Flow, ...]:
+    """When the messages of each topic came in, by the times of receipt by topic."""
+    encodings = {channel.topic: channel.message_encoding for one in contents for channel in one.channels}
     return tuple(
-        _flow(topic, encodings[name], np.sort(np.concatenate(times[name])), start_ns, stamped.get(name))
-        for name, topic in topics_of(one for one, _ in timed).items()
+        _flow(topic, encodings[name], received[name], start_ns, stamped.get(name))
+        for name, topic in topics_of(contents).items()
     )
 
 
