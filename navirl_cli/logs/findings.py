@@ -47,6 +47,13 @@ class Kind(Enum):
         _NOTE,
         "{about} jumps by {size:+.2f} s {at_s:.1f} s after the start; later times were shifted to continue",
     )
+    CLOCK_STEPS = (
+        _NOTE,
+        (
+            "{about} jumps {count} times, by up to {size:+.2f} s, first {at_s:.1f} s after the start; later times were "
+            "shifted to continue"
+        ),
+    )
     LATER_RECEIPTS = (
         _NOTE,
         "messages on {about} are received {size:+.2f} s later than before from {at_s:.1f} s on; their stamps are used",

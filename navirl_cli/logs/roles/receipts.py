@@ -15,6 +15,8 @@ from navirl_cli.logs.roles.tracks import Track
 #: Times of receipt this far from the others, ns, are wrong where they are fewer than this share of all.
 _ANOTHER_DAY_NS: Final = 3600 * NS_PER_S
 _FEW: Final = 0.01
+#: No clock shows a later time than this, ns: the year 2116.
+_LATEST_NS: Final = 1 << 62
 #: Where more than this share of the times of receipt go back by more than a second, they are no times.
 _NONSENSE: Final = 0.2
 
@@ -22,7 +24,7 @@ _NONSENSE: Final = 0.2
 def repaired(tracks: Sequence[Track], reference: Track) -> tuple[list[Track], Findings]:
     """Replace times of receipt that cannot be true.
 
-    A time is wrong if it is 0 while others are not, if it lies beyond what 63 bits hold, or if it is one of a few that
+    A time is wrong if it is 0 while others are not, if it lies beyond the year 2116, or if it is one of a few that
     are more than an hour from all others. All are wrong if they are equal, or if they go back again and again. A wrong
     time is replaced by the message's stamp, shifted by the offset of its neighbours, or interpolated by the places in
     the file.
@@ -55,7 +57,7 @@ def repaired(tracks: Sequence[Track], reference: Track) -> tuple[list[Track], Fi
 
 def wrong_receipts(received_ns: IntArray) -> BoolArray:
     """(n,) which times of receipt cannot be true, by themselves."""
-    wrong: BoolArray = received_ns < 0
+    wrong: BoolArray = (received_ns < 0) | (received_ns > _LATEST_NS)
     if len(received_ns) > 1 and (received_ns == received_ns[0]).all():
         return np.ones(len(received_ns), dtype=np.bool_)
     some = received_ns[~wrong]

@@ -130,7 +130,7 @@ def _changes(track: Track) -> list[_Change]:
     else:
         steps = np.diff(stamped)
         period = float(np.median(steps))
-        rate = period / track.period_s if period > 0 else 1.0
+        rate = _rate(received, stamped, max(_LEAST // 4, round(1.0 / track.period_s)))
         early, relative = steps - period, steps - rate * after_s
     offset = np.concatenate([[0.0], np.cumsum(relative)])
     # dropped messages and pauses move both alike, but for what latency varies by
@@ -158,6 +158,14 @@ def _changes(track: Track) -> list[_Change]:
             )
         )
     return changes
+
+
+def _rate(received: FloatArray, stamped: FloatArray, apart: int) -> float:
+    """How fast the stamps' clock goes by the recorder's: the median over so many messages, in which few steps are."""
+    apart = max(1, min(apart, len(received) // 4))
+    received_s, stamped_s = received[apart:] - received[:-apart], stamped[apart:] - stamped[:-apart]
+    forward = (received_s > 0) & (stamped_s > 0)
+    return float(np.median(stamped_s[forward] / received_s[forward])) if forward.any() else 1.0
 
 
 def _highest(offset: FloatArray, received: FloatArray, row: int, step: int) -> float:
@@ -238,16 +246,20 @@ def _passed(step: Step, path: Path | None) -> bool | None:
     """Whether time has passed while the times jump ahead, by how far the robot came; None if it stands still."""
     if path is None:
         return None
-    row = int(np.searchsorted(path.order, step.after))
-    if not 3 <= row <= len(path.order) - 3:
+    before = int(np.searchsorted(path.order, step.before, side="right")) - 1
+    after = int(np.searchsorted(path.order, step.after))
+    if before < 2 or after > len(path.order) - 3 or before >= after:
         return None
-    came = float(np.hypot(*(path.xy_m[row] - path.xy_m[row - 1])))
-    sides = [np.hypot(*np.diff(path.xy_m[part], axis=0).T) for part in (slice(row - 3, row), slice(row, row + 3))]
+    came = float(np.hypot(*(path.xy_m[after] - path.xy_m[before])))
+    sides = [
+        np.hypot(*np.diff(path.xy_m[part], axis=0).T)
+        for part in (slice(before - 2, before + 1), slice(after, after + 3))
+    ]
     usual, fastest = min(float(side.mean()) for side in sides), max(float(side.max()) for side in sides)
     rows = step.received_s * NS_PER_S / max(float(np.median(np.diff(path.received_ns))), 1.0)
     if usual * rows < max(_MOVED_M, 2 * fastest):
         return None
-    return came > 2 * fastest + 0.01
+    return came > (after - before + 1) * fastest + 0.01
 
 
 def _is_disorder(step: Step, path: Path | None) -> bool:
@@ -266,17 +278,19 @@ def _is_disorder(step: Step, path: Path | None) -> bool:
 
 
 def _is_regular(track: Track, row: int) -> bool:
-    """Whether a track's times of receipt are regular in their own order, around the two on both sides of a row."""
+    """Whether a track's times of receipt, brought into their own order, neither overlap nor leave a gap."""
     received = since_first(track.received_ns)
     in_time = np.sort(received)
     steps = np.diff(in_time)
     largest = max(float(np.diff(received).max()), track.period_s)
     if steps.max() > largest + 5 * track.period_s:
         return False  # the pieces do not follow each other
-    before, after = np.searchsorted(in_time, received[[row - 1, row]]).tolist()
-    # where two pieces overlap, the times between them are shorter
-    insides = steps[max(0, before - 8) : before], steps[after : after + 8]
-    return all(not one.size or float(np.median(one)) >= 0.75 * track.period_s for one in insides)
+    first, last = float(received[row]), float(received[row - 1])
+    # where pieces overlap, there are more messages than the time between the two has room for
+    inside = int(((received >= first) & (received <= last)).sum())
+    steps = np.diff(received)
+    usual_s = float(steps[(steps > 0) & (steps < 3 * track.period_s)].mean())
+    return inside * usual_s <= 1.02 * (last - first) + 5 * track.period_s
 
 
 def _is_common(step: Step, dense: Iterable[Track]) -> bool:

@@ -26,6 +26,8 @@ _IN_ORDER: Final = ("odometry", "wrench")
 _MOMENTARY: Final = ("goal", "joystick")
 #: Roles whose messages count from their receipt on, whatever their stamps say.
 _AT_RECEIPT: Final = ("map", "tf_static")
+#: More steps of one clock are reported together.
+_MOST_STEPS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +216,8 @@ def _transform_times(
 
 
 def _told(steps: Iterable[Step], pauses: Iterable[Step], tracks: Sequence[Track], start_ns: int) -> Findings:
-    """What steps and pauses say, each once."""
-    findings = []
+    """What steps and pauses say, each once; many steps of one clock together."""
+    found: dict[tuple[Kind, str], list[Finding]] = {}
     moved_ns = 0
     for step in steps:
         at_s = (step.at_ns - moved_ns - start_ns) / NS_PER_S
@@ -223,11 +225,19 @@ def _told(steps: Iterable[Step], pauses: Iterable[Step], tracks: Sequence[Track]
             moved_ns += round(step.received_s * NS_PER_S)
         about, size = _whose(step, tracks)
         kind = Kind.CLOCK_STEP if step.common else Kind.LATER_RECEIPTS
-        findings.append(Finding(kind, about, size=size, at_s=at_s))
+        found.setdefault((kind, about), []).append(Finding(kind, about, size=size, at_s=at_s))
+    told = []
+    for (_, about), some in found.items():
+        if len(some) <= _MOST_STEPS:
+            told += some
+            continue
+        largest = max((one.size for one in some), key=abs)
+        told.append(Finding(Kind.CLOCK_STEPS, about, len(some), largest, some[0].at_s))
+    told.sort(key=lambda one: one.at_s or 0.0)
     for step in pauses:
         at_s = (step.at_ns - start_ns) / NS_PER_S
-        findings.append(Finding(Kind.PAUSE, "all topics", size=step.received_s, at_s=at_s))
-    return tuple(findings)
+        told.append(Finding(Kind.PAUSE, "all topics", size=step.received_s, at_s=at_s))
+    return tuple(told)
 
 
 def _whose(step: Step, tracks: Iterable[Track]) -> tuple[str, float]:
