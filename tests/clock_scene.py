@@ -24,8 +24,9 @@ NODES = ("odom", "wrench", "tf", "localisation", "people", "goal", "map")
 class Recorded:
     """What a recorder sees: message by message, in the order in which they come."""
 
-    #: (n,) true times, s, ascending, and the name of the node that sends each.
+    #: (n,) true times, s, when each is sent and when it comes, and the name of the node that sends it.
     true_s: np.ndarray
+    came_s: np.ndarray
     node: np.ndarray
     #: (n,) ns.
     stamp_ns: np.ndarray
@@ -37,11 +38,17 @@ class Recorded:
         return np.isin(self.node, nodes or NODES)
 
     def kept(self, rows: np.ndarray) -> "Recorded":
-        return Recorded(self.true_s[rows], self.node[rows], self.stamp_ns[rows], self.received_ns[rows], self.row[rows])
+        columns = (self.true_s, self.came_s, self.node, self.stamp_ns, self.received_ns, self.row)
+        return Recorded(*(column[rows] for column in columns))
 
     def ordered(self) -> "Recorded":
-        """In the order of the times of receipt."""
-        return self.kept(np.argsort(self.received_ns, kind="stable"))
+        """In the order in which they come."""
+        return self.kept(np.argsort(self.came_s, kind="stable"))
+
+    def coming(self, came_s: np.ndarray) -> "Recorded":
+        """The same that come at other times."""
+        received_ns = self.received_ns + nav.unix(came_s) - nav.unix(self.came_s)
+        return replace(self, came_s=came_s, received_ns=received_ns).ordered()
 
 
 Disturbance = Callable[[Recorded], Recorded]
@@ -83,7 +90,8 @@ def recorded(seed: int = 3) -> Recorded:
     made = _templates()
     true_s = np.array([one[0] for one in made])
     came = np.maximum.accumulate(true_s + np.random.default_rng(seed).exponential(0.002, len(made)))
-    return Recorded(true_s, np.array([one[1] for one in made]), nav.unix(true_s), nav.unix(came), np.arange(len(made)))
+    nodes = np.array([one[1] for one in made])
+    return Recorded(true_s, came, nodes, nav.unix(true_s), nav.unix(came), np.arange(len(made)))
 
 
 def write(path: Path, seen: Recorded, **options: object) -> Path:
@@ -106,13 +114,13 @@ def computer(at_s: float, by_s: float) -> Disturbance:
 
 def recorder(at_s: float, by_s: float) -> Disturbance:
     """Only the recorder's clock is set."""
-    return lambda seen: replace(seen, received_ns=seen.received_ns + _from(seen, at_s, by_s))
+    return lambda seen: replace(seen, received_ns=seen.received_ns + np.where(seen.came_s >= at_s, _ns(by_s), 0))
 
 
 def stamps(at_s: float, by_s: float, *nodes: str) -> Disturbance:
     """The clock that stamps the messages of some nodes, or of all, is set."""
     return lambda seen: replace(
-        seen, stamp_ns=seen.stamp_ns + np.where(seen.sent_by(*nodes), _from(seen, at_s, by_s), 0)
+        seen, stamp_ns=seen.stamp_ns + np.where(seen.sent_by(*nodes) & (seen.true_s >= at_s), _ns(by_s), 0)
     )
 
 
@@ -136,7 +144,7 @@ def receipts(value_ns: int, begin_s: float = -1.0, end_s: float = 1e9) -> Distur
     """The recorder writes one value as the time of receipt for a while."""
 
     def disturbed(seen: Recorded) -> Recorded:
-        inside = (seen.true_s >= begin_s) & (seen.true_s < end_s)
+        inside = (seen.came_s >= begin_s) & (seen.came_s < end_s)
         return replace(seen, received_ns=np.where(inside, np.uint64(value_ns), seen.received_ns.astype(np.uint64)))
 
     return disturbed
@@ -149,13 +157,7 @@ def simulated(seen: Recorded) -> Recorded:
 
 def stall(begin_s: float, end_s: float) -> Disturbance:
     """The recorder receives nothing for a while, then all at once."""
-
-    def disturbed(seen: Recorded) -> Recorded:
-        begin, end = nav.unix(np.array([begin_s, end_s]))
-        late = (seen.received_ns >= begin) & (seen.received_ns < end)
-        return replace(seen, received_ns=np.where(late, end, seen.received_ns))
-
-    return disturbed
+    return lambda seen: seen.coming(np.where((seen.came_s >= begin_s) & (seen.came_s < end_s), end_s, seen.came_s))
 
 
 def pause(begin_s: float, end_s: float) -> Disturbance:
@@ -178,8 +180,7 @@ def latency(mean_s: float, *nodes: str, seed: int = 1) -> Disturbance:
 
     def disturbed(seen: Recorded) -> Recorded:
         takes = np.random.default_rng(seed).exponential(mean_s, len(seen.row)) * seen.sent_by(*nodes)
-        late = replace(seen, received_ns=seen.received_ns + np.round(takes * 1e9).astype(np.int64))
-        return late.ordered()
+        return seen.coming(seen.came_s + takes)
 
     return disturbed
 
@@ -200,5 +201,5 @@ def by_topic(seen: Recorded) -> Recorded:
     return seen.kept(np.lexsort((seen.true_s, seen.node)))
 
 
-def _from(seen: Recorded, at_s: float, by_s: float) -> np.ndarray:
-    return np.where(seen.true_s >= at_s, round(by_s * 1e9), 0)
+def _ns(seconds: float | np.ndarray) -> np.ndarray:
+    return np.round(np.asarray(seconds) * 1e9).astype(np.int64)

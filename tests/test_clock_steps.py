@@ -185,8 +185,10 @@ def test_a_pause_while_the_robot_drives_is_a_gap(tmp_path, begin_s, end_s):
 def test_a_pause_while_the_robot_stands_still_is_reported(tmp_path, base):
     _, recording, (one,) = disturbed(tmp_path, scene.pause(18.5, 20.0))
     assert recording.notes == (
-        "run.mcap: all topics pause for 1.50 s 18.5 s after the start, while the robot stands still: the recording "
-        "paused, or a clock jumped",
+        (
+            "run.mcap: all topics pause for 1.50 s 18.5 s after the start, while the robot stands still: the recording "
+            "paused, or a clock jumped"
+        ),
     )
     check_same(one, base)
 
@@ -196,3 +198,31 @@ def test_the_order_in_the_file_is_known_in_every_container(tmp_path, base, optio
     path, recording, (one,) = disturbed(tmp_path, scene.computer(10.0, -40.0), **options)
     check_same(one, base)
     check_told(path, recording, COMPUTER, 10.0, -40.0)
+
+
+CASES = Path(__file__).resolve().parent.parent.parent / "shared" / "cases"
+SAID = {
+    "robot_clock_back_40s": r"the clock of the computer .* jumps by -40.00 s 9.0 s after",
+    "robot_clock_back_5s": r"the clock of the computer .* jumps by -5.00 s 9.0 s after",
+    "recorder_step_back": r"the recorder's clock .* jumps by -40.00 s 9.0 s after",
+    "recorder_step_forward_3s": r"the recorder's clock .* jumps by \+3.00 s 9.0 s after",
+    "log_time_zero_9s": r"gives 632 times of receipt that cannot be true, such as 0;",
+    "log_time_max": r"gives 1 times of receipt that cannot be true, such as 18446744073709551615 ns;",
+    "tf_clock_off_+3s": r"/tf .map -> odom. is stamped by another clock than /odom: \+3.000 s",
+}
+
+
+@pytest.mark.skipif(not CASES.exists(), reason=f"no {CASES}")
+@pytest.mark.parametrize("name", SAID)
+def test_a_case_beside_the_project(name):
+    (base,), (one,) = (
+        extract(load_recording(CASES / f"{case}.mcap"), ExtractSettings()).demonstrations for case in ("base", name)
+    )
+    check_same(one, base)
+    recording = load_recording(CASES / f"{name}.mcap")
+    (note,) = recording.notes
+    assert re.search(SAID[name], note)
+    view = overview(Source("run", (CASES / f"{name}.mcap",)), {})
+    assert note.partition(": ")[2] in view.findings
+    assert (view.end_ns - view.start_ns) / 1e9 == pytest.approx(21.0, abs=0.2)
+    assert view.start_ns // 10**9 == 1_700_000_000

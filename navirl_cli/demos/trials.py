@@ -100,6 +100,8 @@ def _at_goals(recording: Recording, standing: BoolArray) -> list[Trial]:
     for start, goal in zip(starts.tolist(), recording.goal_m, strict=True):
         if start < len(recording.t_ns) and (not kept or _is_new(recording, kept[-1], start, goal)):
             kept.append((start, goal))
+    if not kept:
+        return []
     borders = [start for start, _ in kept[1:]] + [len(recording.t_ns)]
     return [
         _towards(recording, standing, (start, border), goal)

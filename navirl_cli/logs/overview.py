@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.logs.container.batches import Batch, Channel
+from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
@@ -20,6 +20,7 @@ from navirl_cli.logs.findings import Severity
 from navirl_cli.logs.load import Line, LoadOptions, follow
 from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
+from navirl_cli.logs.messages.reader import check as check_messages
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
@@ -261,15 +262,12 @@ def _all_damage(files: Sequence[RawFile], progress: Progress | None) -> list[Dam
     total = sum(file.size for file in files)
     notes: list[Damage] = []
     done = 0
-    for path in files:
-        with LogFile(path) as log:
-            for _ in log.results(lambda _: True, _count, threads_here()):
-                if progress is not None:
-                    progress(done + log.position, total)
-            notes += log.damage
-        done += path.size
+    for file in files:
+
+        def report(share: float, done: int = done, size: int = file.size) -> None:
+            if progress is not None:
+                progress(done + round(share * size), total)
+
+        notes += check_messages(file, report, threads_here())
+        done += file.size
     return notes
-
-
-def _count(batch: Batch) -> int:
-    return len(batch.starts)

@@ -1,7 +1,7 @@
 """The stage of space: all tables of a recording in one frame."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 from numpy.typing import NDArray
@@ -59,16 +59,7 @@ def in_one_frame(
         [link for one in tables.get("tf_static", ()) for link in links_of(_tf_columns(one), one.owner_counts)],
         [link for one in tables.get("tf", ()) for link in links_of(_tf_columns(one), one.owner_counts)],
     )
-    refusals: list[NavirlError] = []
-
-    def attempt(place: Callable[[], T]) -> T | None:
-        """What a role gives, or its refusal, so that all refusals are found."""
-        try:
-            return place()
-        except NavirlError as error:
-            refusals.append(error)
-            return None
-
+    attempt = _Attempts()
     own_map = (occupancy, "") if occupancy is not None else None
     maps = tables.get("map", ())
     map_and_frame = own_map or (attempt(lambda: map_in(log, maps)) if maps else None)
@@ -91,13 +82,32 @@ def in_one_frame(
         people=people,
         findings=(
             *_ignored(tree),
-            *(poses[1] if poses else ()),
-            *(wrench[1] if wrench else ()),
+            *(one for part in (poses, wrench) if part for one in part[1]),
             *lost_people,
             *lost_goals,
         ),
-        refusals=tuple(refusals),
+        refusals=tuple(attempt.refusals),
     )
+
+
+@dataclass(eq=False)
+class _Attempts:
+    """Calls what may refuse a log, so that all refusals are found."""
+
+    refusals: list[NavirlError] = field(default_factory=list)
+
+    def __call__(self, place: Callable[[], T]) -> T | None:
+        """What a role gives; None where it refuses the log."""
+        try:
+            return place()
+        except NavirlError as error:
+            self.refusals.append(error)
+            return None
+
+
+def _found(part: tuple[object, Findings] | None) -> Findings:
+    """What a role that gave something found out."""
+    return part[1] if part else ()
 
 
 def _first(tables: Tables, role: str) -> Columns | None:

@@ -25,7 +25,9 @@ STEP_S: Final = 0.45
 #: Within this time a recorder that stalled has caught up, s.
 _WINDOW_S: Final = 2.0
 #: and this many messages are enough to see one that is not late.
-_LEAST: Final = 20
+_LEAST: Final = 8
+#: A clock whose rate is this near to 1 runs in real time; a simulation's may not.
+_REAL_TIME: Final = 0.02
 #: Two topics see the same step if their sizes agree to this, s.
 _SAME_S: Final = 0.3
 #: A topic has gone on where its time lies this near to its period, s.
@@ -54,6 +56,9 @@ class _Change:
     #: Places in the recorder's order of the messages before and after.
     before: int
     after: int
+    #: Of the first messages whose time of receipt, and whose stamp, is after the step: mostly the same.
+    received_after: int
+    stamped_after: int
     #: Time of receipt of the message before, ns.
     at_ns: int
     #: Steps of the recorder's clock and of the stamps', s; both positive and equal for what may be a pause.
@@ -74,8 +79,8 @@ class Step:
     received_s: float
     #: By track the step of its stamps, s.
     stamped_s: dict[Track, float] = field(default_factory=dict)
-    #: By track the place of the first message after it.
-    places: dict[Track, int] = field(default_factory=dict)
+    #: By track the places of the first messages whose time of receipt, and whose stamp, is after it.
+    places: dict[Track, tuple[int, int]] = field(default_factory=dict)
     #: Between these places all tracks have it.
     before: int = 0
     after: int = 0
@@ -86,9 +91,9 @@ class Step:
     #: Whether it is one of all topics, and not of the receipt of some.
     common: bool = True
 
-    def place_in(self, track: Track) -> int:
-        """Where it is in a track."""
-        return self.places.get(track, self.after)
+    def places_in(self, track: Track) -> tuple[int, int]:
+        """Where it is in a track's times of receipt, and in its stamps."""
+        return self.places.get(track, (self.after, self.after))
 
 
 def steps_of(tracks: Sequence[Track], path: Path | None) -> tuple[list[Step], list[Step]]:
@@ -105,7 +110,8 @@ def steps_of(tracks: Sequence[Track], path: Path | None) -> tuple[list[Step], li
     found: list[Step] = []
     for track in dense:
         for change in _changes(track):
-            _join(found, change)
+            if max(abs(change.received_s), abs(change.stamped_s or 0.0)) > STEP_S:
+                _join(found, change)
     steps: list[Step] = []
     unknown: list[Step] = []
     for step in sorted(found, key=lambda one: one.after):
@@ -121,8 +127,8 @@ def steps_of(tracks: Sequence[Track], path: Path | None) -> tuple[list[Step], li
 
 
 def _changes(track: Track) -> list[_Change]:
-    """Where a track's times break their periods."""
-    received, stamped, rows = track.received_s, track.stamped_s, track.sound
+    """Where a track's times break their periods; changes that cancel are none."""
+    received, stamped = track.received_s, track.stamped_s
     after_s = np.diff(received)
     late = after_s - track.period_s
     if stamped is None:
@@ -130,34 +136,46 @@ def _changes(track: Track) -> list[_Change]:
     else:
         steps = np.diff(stamped)
         period = float(np.median(steps))
-        rate = _rate(received, stamped, max(_LEAST // 4, round(1.0 / track.period_s)))
+        rate = _rate(received, stamped, max(_LEAST, round(1.0 / track.period_s)))
         early, relative = steps - period, steps - rate * after_s
     offset = np.concatenate([[0.0], np.cumsum(relative)])
     # dropped messages and pauses move both alike, but for what latency varies by
     ahead = (late > STEP_S) & (early > STEP_S) & (np.abs(late - early) < _SAME_S)
     together = (late < -STEP_S) | ahead
-    changes = []
+    found: list[tuple[int, float, float]] = []
     rows_changed = np.flatnonzero((np.abs(relative) > STEP_S) | together)
     for row in rows_changed.tolist() if len(rows_changed) <= _MOST else ():
         a, b = float(late[row]), float(early[row])
         r, s = a, b
         if abs(relative[row]) > STEP_S:
-            net = _highest(offset, received, row + 1, 1) - _highest(offset, received, row, -1)
+            net = _net(offset, received, row)
             if abs(net) <= STEP_S:
                 continue
             r, s = _attributed(a, b, net, rate)
-        before, after = rows[row], rows[row + 1]
-        changes.append(
-            _Change(
-                track,
-                int(track.order[before]),
-                int(track.order[after]),
-                int(track.received_ns[before]),
-                r,
-                None if stamped is None else s,
-            )
-        )
-    return changes
+        found.append((row, r, s))
+    return [
+        _change(track, [found[one] for one in some])
+        for some in np.split(np.arange(len(found)), np.flatnonzero(np.diff([row for row, _, _ in found]) > _LEAST) + 1)
+        if len(some)
+    ]
+
+
+def _change(track: Track, some: Sequence[tuple[int, float, float]]) -> _Change:
+    """A track's change from what its rows show, s: messages that overtake each other show it in pieces."""
+    rows = track.sound
+    (first, *_), (last, *_) = some[0], some[-1]
+    received_row, *_ = max(some, key=lambda one: abs(one[1]))
+    stamped_row, *_ = max(some, key=lambda one: abs(one[2]))
+    return _Change(
+        track,
+        before=int(track.order[rows[first]]),
+        after=int(track.order[rows[last + 1]]),
+        received_after=int(track.order[rows[received_row + 1]]),
+        stamped_after=int(track.order[rows[stamped_row + 1]]),
+        at_ns=int(track.received_ns[rows[first]]),
+        received_s=sum(one[1] for one in some),
+        stamped_s=sum(one[2] for one in some) if track.is_stamped else None,
+    )
 
 
 def _rate(received: FloatArray, stamped: FloatArray, apart: int) -> float:
@@ -165,21 +183,32 @@ def _rate(received: FloatArray, stamped: FloatArray, apart: int) -> float:
     apart = max(1, min(apart, len(received) // 4))
     received_s, stamped_s = received[apart:] - received[:-apart], stamped[apart:] - stamped[:-apart]
     forward = (received_s > 0) & (stamped_s > 0)
-    return float(np.median(stamped_s[forward] / received_s[forward])) if forward.any() else 1.0
+    rate = float(np.median(stamped_s[forward] / received_s[forward])) if forward.any() else 1.0
+    return rate if abs(rate - 1.0) > _REAL_TIME else 1.0
 
 
-def _highest(offset: FloatArray, received: FloatArray, row: int, step: int) -> float:
-    """The highest offset within the window before or after a row: that of the message with the least latency.
+def _net(offset: FloatArray, received: FloatArray, row: int) -> float:
+    """By how much the offset of the messages with the least latency changes after a row, s.
+
+    A recorder that catches up brings the offset back to where it was: what goes beyond that is another step.
+    """
+    before, after = _window(offset, received, row, -1), _window(offset, received, row + 1, 1)
+    highest = float(before.max())
+    falls = offset[row + 1] < offset[row]
+    return float((np.minimum(after, highest) if falls else after).max()) - highest
+
+
+def _window(offset: FloatArray, received: FloatArray, row: int, step: int) -> FloatArray:
+    """The offsets within some time before or after a row.
 
     The window also holds so many messages that a recorder that stalls cannot fill it.
     """
     count = 1
     while 0 <= (at := row + step * count) < len(offset):
-        if count >= _LEAST and not 0 <= step * (received[at] - received[row]) <= _WINDOW_S:
+        if count >= _LEAST and not -STEP_S <= step * (received[at] - received[row]) <= _WINDOW_S:
             break
         count += 1
-    window = offset[row : row + count] if step > 0 else offset[row - count + 1 : row + 1]
-    return float(window.max())
+    return offset[row : row + count] if step > 0 else offset[row - count + 1 : row + 1]
 
 
 def _attributed(late: float, early: float, net: float, rate: float) -> tuple[float, float]:
@@ -227,7 +256,7 @@ def _join(found: list[Step], change: _Change) -> None:
     else:
         step = Step(change.received_s, before=change.before, after=change.after, at_ns=change.at_ns, ahead=change.ahead)
         found.append(step)
-    step.places[change.track] = change.after
+    step.places[change.track] = change.received_after, change.stamped_after
     if change.stamped_s:
         same = [one for one in step.stamped_s.values() if abs(one - change.stamped_s) < _SAME_S]
         both = abs(change.stamped_s - step.received_s) < _SAME_S
@@ -267,7 +296,7 @@ def _is_disorder(step: Step, path: Path | None) -> bool:
     track = next(iter(step.places))
     if any(not stamped for stamped in [step.stamped_s.get(one, 0.0) for one in step.places if one.is_stamped]):
         return False  # stamps that go on evenly in the file's order prove that order
-    row = int(np.searchsorted(track.order, step.places[track]))
+    row = int(np.searchsorted(track.order, step.places[track][0]))
     if _is_regular(track, row):
         return True
     if path is None or not 0 < (row := int(np.searchsorted(path.order, step.after))) < len(path.order):

@@ -9,7 +9,7 @@ import numpy as np
 from navirl_cli.arrays import IntArray
 from navirl_cli.errors import LogError
 from navirl_cli.logs.findings import Finding, Findings, Kind
-from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, Clock, Stamped, TimeSource
+from navirl_cli.logs.roles.clocks import APART_S, NS_PER_S, WILD_S, Clock, Stamped, TimeSource
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.receipts import repaired
 from navirl_cli.logs.roles.steps import Path, Step, steps_of
@@ -26,6 +26,8 @@ _IN_ORDER: Final = ("odometry", "wrench")
 _MOMENTARY: Final = ("goal", "joystick")
 #: Roles whose messages count from their receipt on, whatever their stamps say.
 _AT_RECEIPT: Final = ("map", "tf_static")
+#: Messages that may overtake each other.
+_OVERTAKEN: Final = 8
 #: More steps of one clock are reported together.
 _MOST_STEPS: Final = 4
 
@@ -65,10 +67,12 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
             f"{log}: expected odometry, tf or a wrench, whose stamps are the recording's clock, found none; "
             "name the odometry with `topic` odometry=/name"
         )
-    roles = [(role, number) for role, tracks in by_role.items() for number in range(len(tracks))]
-    tracks, wrong = repaired([by_role[role][number] for role, number in roles], reference)
-    reference = tracks[[by_role[role][number] for role, number in roles].index(reference)]
-    steps, pauses = steps_of(tracks, _path(tables, by_role, dict(zip(roles, tracks, strict=True))))
+    roles = [role for role, some in by_role.items() for _ in some]
+    read = [track for some in by_role.values() for track in some]
+    tracks, wrong = repaired(read, reference)
+    reference = tracks[read.index(reference)]
+    odometry = next((one for one, role in zip(tracks, roles, strict=True) if role == "odometry"), None)
+    steps, pauses = steps_of(tracks, _path(tables, odometry))
     without = [_without_steps(track, steps) for track in tracks]
     received = _received(without)
     start_ns = min(int(times[0]) for times in received.values())
@@ -77,9 +81,12 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
     timed: dict[str, list[Columns]] = {role: [] for role in tables}
     findings: list[Finding] = [*wrong, *_told(steps, pauses, tracks, start_ns), *_described(clock)]
     for role, several in tables.items():
-        mine = [(track, after) for (name, _), track, after in zip(roles, tracks, without, strict=True) if name == role]
         for columns in several:
-            own = [(track, after) for track, after in mine if track.topic == columns.topic]
+            own = [
+                (track, after)
+                for name, track, after in zip(roles, tracks, without, strict=True)
+                if name == role and track.topic == columns.topic
+            ]
             one = _timed(role, columns, own, clock, () if source is TimeSource.LOG else shifts)
             if role in _IN_ORDER:
                 one, late = in_order(one)
@@ -115,13 +122,10 @@ def _reference(by_role: Mapping[str, Sequence[Track]]) -> Track | None:
     return None
 
 
-def _path(
-    tables: Tables, by_role: Mapping[str, Sequence[Track]], repaired_by: Mapping[tuple[str, int], Track]
-) -> Path | None:
+def _path(tables: Tables, track: Track | None) -> Path | None:
     """Where the odometry is at its messages, in the recorder's order."""
-    if not by_role.get("odometry"):
+    if track is None:
         return None
-    track = repaired_by["odometry", 0]
     xy = tables["odometry"][0].stacked("px", "py")[track.rows]
     good = np.isfinite(xy).all(axis=1)
     return Path(track.order[good], track.received_ns[good], xy[good])
@@ -131,13 +135,31 @@ def _without_steps(track: Track, steps: Iterable[Step]) -> Track:
     """A track whose clocks go on evenly."""
     received = track.received_ns.copy()
     stamps = None if track.stamp_ns is None else track.stamp_ns.copy()
+    places = []
     for step in steps:
-        rows = track.order >= step.place_in(track)
+        received_after, stamped_after = step.places_in(track)
+        places += [received_after, stamped_after]
         if step.common or track in step.places:
-            received[rows] -= round(step.received_s * NS_PER_S)
+            received[track.order >= received_after] -= round(step.received_s * NS_PER_S)
         if stamps is not None and track in step.stamped_s:
-            stamps[rows & (stamps != 0)] -= round(step.stamped_s[track] * NS_PER_S)
-    return replace(track, received_ns=received, stamp_ns=stamps)
+            stamps[(track.order >= stamped_after) & (stamps != 0)] -= round(step.stamped_s[track] * NS_PER_S)
+    return replace(track, received_ns=_between(track, received, places), stamp_ns=stamps)
+
+
+def _between(track: Track, received: IntArray, places: Sequence[int]) -> IntArray:
+    """(n,) ns of receipt; messages beside a step that belong neither before nor after it are put between others."""
+    if not places or not track.sound.size:
+        return received
+    unsound = np.ones(len(track), dtype=np.bool_)
+    unsound[track.sound] = False
+    wrong = np.flatnonzero(unsound)
+    wrong = wrong[(np.abs(wrong[:, None] - np.searchsorted(track.order, places)) <= _OVERTAKEN).any(axis=1)]
+    begin = received[track.sound[0]]
+    expected = np.interp(wrong, track.sound, (received[track.sound] - begin).astype(np.float64))
+    near = np.abs(received[wrong] - begin - expected) <= WILD_S * NS_PER_S
+    fixed = received.copy()
+    fixed[wrong] = np.where(near, received[wrong], begin + np.round(expected).astype(np.int64))
+    return fixed
 
 
 def _received(tracks: Iterable[Track]) -> dict[str, IntArray]:
