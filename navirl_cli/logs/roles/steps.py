@@ -32,6 +32,8 @@ _REAL_TIME: Final = 0.02
 _SAME_S: Final = 0.3
 #: A topic has gone on where its time lies this near to its period, s.
 _EVEN_S: Final = 0.2
+#: Messages that are in flight while a clock steps show the step of one time before that of the other.
+_IN_FLIGHT: Final = 3
 #: A topic with more changes than this has no regular times.
 _MOST: Final = 500
 #: From this distance on a robot has moved, m.
@@ -116,7 +118,8 @@ def steps_of(tracks: Sequence[Track], path: Path | None) -> tuple[list[Step], li
     unknown: list[Step] = []
     for step in sorted(found, key=lambda one: one.after):
         if step.ahead:
-            verdict = _passed(step, path) if _is_everywhere(step, tracks) else True
+            everywhere = _is_common(step, dense) and _is_everywhere(step, tracks)
+            verdict = _passed(step, path) if everywhere else True
             (unknown if verdict is None else steps if not verdict else []).append(step)
         elif step.received_s < 0 and _is_disorder(step, path):
             continue
@@ -139,25 +142,26 @@ def _changes(track: Track) -> list[_Change]:
         rate = _rate(received, stamped, max(_LEAST, round(1.0 / track.period_s)))
         early, relative = steps - period, steps - rate * after_s
     offset = np.concatenate([[0.0], np.cumsum(relative)])
-    # dropped messages and pauses move both alike, but for what latency varies by
-    ahead = (late > STEP_S) & (early > STEP_S) & (np.abs(late - early) < _SAME_S)
-    together = (late < -STEP_S) | ahead
+    rows = np.flatnonzero((np.abs(relative) > STEP_S) | (late < -STEP_S) | ((late > STEP_S) & (early > STEP_S)))
     found: list[tuple[int, float, float]] = []
-    rows_changed = np.flatnonzero((np.abs(relative) > STEP_S) | together)
-    for row in rows_changed.tolist() if len(rows_changed) <= _MOST else ():
-        a, b = float(late[row]), float(early[row])
-        r, s = a, b
-        if abs(relative[row]) > STEP_S:
+    for some in _runs(rows, _IN_FLIGHT) if len(rows) <= _MOST else ():
+        r, s = float(late[some].sum()), float(early[some].sum())
+        if abs(r) > STEP_S and abs(r - s) < (_SAME_S if r > 0 else STEP_S):
+            # both move alike, though messages in flight may show one before the other
+            found += [(row, float(late[row]), float(early[row])) for row in some.tolist()]
+            continue
+        for row in some.tolist():
             net = _net(offset, received, row)
-            if abs(net) <= STEP_S:
-                continue
-            r, s = _attributed(a, b, net, rate)
-        found.append((row, r, s))
-    return [
-        _change(track, [found[one] for one in some])
-        for some in np.split(np.arange(len(found)), np.flatnonzero(np.diff([row for row, _, _ in found]) > _LEAST) + 1)
-        if len(some)
-    ]
+            if abs(net) > STEP_S:
+                found.append((row, *_attributed(float(late[row]), float(early[row]), net, rate)))
+    by_row = {row: (row, r, s) for row, r, s in found}
+    runs = _runs(np.array(list(by_row), dtype=np.int64), _LEAST)
+    return [_change(track, [by_row[row] for row in some.tolist()]) for some in runs if len(some)]
+
+
+def _runs(rows: IntArray, apart: int) -> list[IntArray]:
+    """Ascending rows in runs whose neighbours are at most so far apart."""
+    return np.split(rows, np.flatnonzero(np.diff(rows) > apart) + 1)
 
 
 def _change(track: Track, some: Sequence[tuple[int, float, float]]) -> _Change:
@@ -265,10 +269,14 @@ def _join(found: list[Step], change: _Change) -> None:
 
 
 def _is_everywhere(step: Step, tracks: Iterable[Track]) -> bool:
-    """Whether no message of any topic was received while the times jump ahead."""
+    """Whether no message of any topic stands in the file where the times jump ahead, with a time in between."""
     slack = round(0.1 * NS_PER_S)
     first, last = step.at_ns + slack, step.at_ns + round(step.received_s * NS_PER_S) - slack
-    return not any(((first < track.received_ns) & (track.received_ns < last)).any() for track in tracks)
+    for track in tracks:
+        between = track.received_ns[(track.order > step.before) & (track.order < step.after)]
+        if ((first < between) & (between < last)).any():
+            return False
+    return True
 
 
 def _passed(step: Step, path: Path | None) -> bool | None:
