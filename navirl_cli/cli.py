@@ -1,7 +1,9 @@
 """The command line. Commands are imported when called. Only this module turns expected errors into messages."""
 
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Any
 
 import click
@@ -15,15 +17,25 @@ from navirl_cli.errors import NavirlError
 #: _ for -. It is imported when the command is called, so that help and completion are fast.
 COMMANDS = {
     "inspect": "Show the content of logs, and the topics that extract would use.",
+    "annotate": "Write the labels of trials into a copy of a log.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
+    "plan": "Plan the path of a robot that drives by a learnt reward.",
     "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",
     "simulate": "Simulate people who push a robot, and write logs with known truth.",
 }
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM: cleaned up after as Ctrl-C is."""
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    raise _Terminated
 
 
 class _Root(LazyGroup):
@@ -37,8 +49,10 @@ class _Root(LazyGroup):
             if ctx.params.get("debug"):
                 raise
             line, code = as_options(str(error)), 1
+        except _Terminated:
+            line, code = "terminated", 143  # as a shell reports a process that SIGTERM ended
         except KeyboardInterrupt:
-            line, code = "interrupted", 130  # as a shell reports a process that SIGINT ended
+            line, code = "interrupted", 130  # the same of SIGINT
         click.echo(f"navirl: {line}", err=True)
         return ctx.exit(code)
 
@@ -61,7 +75,7 @@ def cli(debug: bool) -> None:
     """Learn how a robot should drive around people from people who push it.
 
     Exit codes: 0 done; 1 error in the data or files; 2 wrong usage; 3 done, but some data was lost or skipped; 130
-    interrupted.
+    interrupted; 143 terminated.
     """
 
 
@@ -70,6 +84,7 @@ def main() -> None:
     # The matrices are sparse or small: starting the threads of a BLAS would cost more time than they save. Their number
     # is set before numpy is imported, unless the user has set it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    signal.signal(signal.SIGTERM, _terminate)
     if "_NAVIRL_COMPLETE" in os.environ:
         from navirl_cli.commands.completion import use_whole_words
 

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 #: Largest number of names that a message lists.
 MOST_NAMES = 20
+#: Largest number of reasons that a message lists, and of letters of each.
+MOST_REASONS, MOST_LETTERS = 5, 700
 
 
 class NavirlError(Exception):
@@ -46,6 +48,10 @@ class ArtefactError(NavirlError):
     """A file that navirl reads or writes is missing, exists already or breaks its schema."""
 
 
+class LabelError(ArtefactError):
+    """A table of trials does not fit the logs."""
+
+
 class MissingPackageError(NavirlError):
     """An optional package is not installed."""
 
@@ -55,6 +61,20 @@ class NavirlWarning(UserWarning):
 
     Only the Python interface gives it.
     """
+
+
+def joined(reasons: Iterable[str], prefix: str = "") -> str:
+    """Reasons in one line: each once and not longer than a paragraph, of many the first ones.
+
+    Args:
+        reasons: The most specific first.
+        prefix: What each begins with and the line need not repeat.
+    """
+    own = list(dict.fromkeys(reason.removeprefix(prefix) for reason in reasons))
+    shown = [one if len(one) <= MOST_LETTERS else f"{one[: MOST_LETTERS - 3]}..." for one in own[:MOST_REASONS]]
+    if len(own) > MOST_REASONS:
+        shown.append(f"and {len(own) - MOST_REASONS} more")
+    return "; ".join(shown)
 
 
 def brief(value: object) -> str:

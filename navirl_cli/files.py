@@ -5,10 +5,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import count
 from pathlib import Path
+from shutil import rmtree
+from socket import gethostname
 from stat import S_ISDIR, S_ISREG
 
 from navirl_cli.errors import ArtefactError
+
+#: Numbers of this process's temporary files.
+_NUMBERS = count()
 
 
 @dataclass(frozen=True)
@@ -37,11 +43,13 @@ class Input:
 
 @contextmanager
 def replacing(path: Path, *, force: bool) -> Iterator[Path]:
-    """Write a file under a temporary name in the same folder and rename it when the block ends well.
+    """Write a file under a temporary name in the same folder and give it its name when the block ends well.
+
+    Temporary files that a killed process of this machine left in the folder are removed first.
 
     Args:
         path: The file to write.
-        force: Whether an existing file may be replaced.
+        force: Whether an existing file may be replaced. If not, a file that appears while the block runs stays.
 
     Yields:
         The temporary name. After an exception the temporary file is removed.
@@ -51,14 +59,126 @@ def replacing(path: Path, *, force: bool) -> Iterator[Path]:
     """
     check_writable(path, force=force)
     path = path.resolve()  # replace the target of a link, not the link
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    _remove_stale(path.parent)
+    temporary = _temporary(path.parent)
     try:
         yield temporary
-        temporary.replace(path)
+        if force:
+            temporary.replace(path)
+        else:
+            _name_new(temporary, path)
+    except FileExistsError:
+        raise ArtefactError(_exists(path)) from None
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _exists(path: Path) -> str:
+    """The message for a file that may not be replaced."""
+    return f"{path}: exists already; choose another name, or replace it with `force`"
+
+
+def _name_new(temporary: Path, path: Path) -> None:
+    """Give a temporary file its name, unless a file has it.
+
+    Raises:
+        FileExistsError: A file has the name.
+    """
+    try:
+        os.link(temporary, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links: an empty file of ours holds the name
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        temporary.replace(path)
+
+
+def _temporary(folder: Path) -> Path:
+    """A new hidden name in a folder, short whatever the name of the result: names may have 255 bytes."""
+    return folder / f"{_prefix()}{os.getpid()}-{next(_NUMBERS)}.tmp"
+
+
+def _prefix() -> str:
+    """How names of temporary files of this machine begin."""
+    return f".navirl-{sha256(gethostname().encode()).hexdigest()[:8]}-"
+
+
+def _remove_stale(folder: Path) -> None:
+    """Remove temporary files and folders of processes of this machine that do not run any more."""
+    for one in folder.glob(f"{_prefix()}*.tmp"):
+        process = one.name.removeprefix(_prefix()).partition("-")[0]
+        if process.isdigit() and not _runs(int(process)):
+            with suppress(OSError):
+                rmtree(one) if one.is_dir() else one.unlink()
+
+
+def _runs(process: int) -> bool:
+    """Whether a process of this machine runs."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it belongs to another user
+        return True
+    return True
+
+
+@contextmanager
+def swapped_folder(path: Path) -> Iterator[Path]:
+    """Write a folder of results under a temporary name, and put it in place as a whole when the block ends well.
+
+    Files of an older folder that the new one does not have are carried over. A process that is killed leaves the older
+    folder or the new one. Only where a folder cannot be renamed (the root of a mounted file system) its files are
+    replaced one by one.
+
+    Args:
+        path: The folder.
+
+    Yields:
+        The temporary folder.
+
+    Raises:
+        ArtefactError: It cannot be made.
+    """
+    path = path.resolve()
+    with new_folder(path.parent):
+        beside = os.access(path.parent, os.W_OK) and not path.is_mount()
+        home = path.parent if beside else path
+        _remove_stale(home)
+        new = _temporary(home)
+        try:
+            new.mkdir()
+            yield new
+            if beside:
+                _swap(new, path)
+            else:
+                _carry_over(new, path)
+        except OSError as error:
+            raise ArtefactError(f"{path}: cannot be written: {error.strerror or error}") from error
+        finally:
+            rmtree(new, ignore_errors=True)
+
+
+def _swap(new: Path, path: Path) -> None:
+    """Rename a folder to a name that another one may have; what only that one holds moves over."""
+    old = path.with_name(f"{path.name[:200]}.old-{os.getpid()}")
+    if path.exists():
+        path.rename(old)
+    new.rename(path)
+    if old.exists():
+        _carry_over(old, path, keep=True)
+        rmtree(old)
+
+
+def _carry_over(source: Path, target: Path, *, keep: bool = False) -> None:
+    """Move the files of a folder into another one; with ``keep`` only those that it does not have."""
+    for one in sorted(path for path in source.rglob("*") if not path.is_dir() or path.is_symlink()):
+        moved = target / one.relative_to(source)
+        if not (keep and (moved.exists() or moved.is_symlink())):
+            moved.parent.mkdir(parents=True, exist_ok=True)
+            one.replace(moved)
 
 
 @contextmanager
@@ -102,7 +222,7 @@ def check_writable(path: Path, *, force: bool) -> None:
         what = "a folder; name a file in it" if S_ISDIR(kind) else "something else; choose another name"
         raise ArtefactError(f"{path}: expected the name of a file to write, found {what}")
     if kind is not None and not force:
-        raise ArtefactError(f"{path}: exists already; choose another name, or replace it with `force`")
+        raise ArtefactError(_exists(path))
     if not path.parent.is_dir():
         raise ArtefactError(f"{path}: expected an existing folder, found none at {path.parent}; create it")
     if not os.access(path.parent, os.W_OK):

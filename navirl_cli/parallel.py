@@ -2,12 +2,17 @@
 
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import partial
+from threading import Thread
 from types import FrameType
 from typing import TypeVar
+
+#: A worker whose parent is gone has this long to clean up, s.
+_GRACE_S = 2.0
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -73,8 +78,10 @@ class _Worker:
 
     @classmethod
     def listen(cls) -> None:
-        """Handle interrupts from now on, in a new process."""
+        """Handle interrupts and the end of the parent from now on, in a new process."""
+        Thread(target=cls._follow_parent, daemon=True).start()
         signal.signal(signal.SIGINT, cls._interrupted)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
@@ -88,6 +95,20 @@ class _Worker:
             return function(item)
         finally:
             cls.busy = False
+
+    @classmethod
+    def _follow_parent(cls) -> None:
+        """End with the parent, even if it was killed: nobody waits for the results."""
+        from multiprocessing import parent_process
+
+        parent = parent_process()
+        if parent is None:
+            return
+        parent.join()
+        if cls.busy:  # the present item is cleaned up
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(_GRACE_S)
+        os._exit(1)
 
     @classmethod
     def _interrupted(cls, _number: int, _frame: FrameType | None) -> None:

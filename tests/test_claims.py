@@ -39,7 +39,7 @@ CLAIMS = {
         schema=("ros2msg", "std_msgs/Header header\n"),
     ),
     "no schema": Claim(
-        r"topic /x: .* schema '' \(\): the messages' encoding is 'cdr' and the schema's encoding is ''; its messages ",
+        "topic /x: a schema without a name has no definition in the file, so that its messages cannot be decoded; rec",
         name="",
         schema=("", ""),
     ),
@@ -74,13 +74,18 @@ CLAIMS = {
         field="wrench.force.x.y",
     ),
     "cdr that is json": Claim(
-        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(Invalid or unsupported CDR encapsulation",
+        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(expected plain CDR.* found 0x7b22\)",
         payload=b'{"force": 3}',
         tried=True,
     ),
     "parameter list": Claim(
-        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(Invalid or unsupported CDR encapsulation",
+        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(expected plain CDR.* found 0x0003\)",
         payload=b"\0\3" + WRENCH_PAYLOAD[2:],
+        tried=True,
+    ),
+    "the second version of CDR": Claim(
+        r"all 5 messages of /x do not decode as w_msgs/msg/W and are lost \(expected .* found XCDR2, 0x0007\)",
+        payload=b"\0\7" + WRENCH_PAYLOAD[2:],
         tried=True,
     ),
     "another type": Claim(

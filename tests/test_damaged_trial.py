@@ -60,12 +60,14 @@ def cut_in_the_last_second(path):
     return rf"bytes {start} to {start + size // 2} \(13\.\d+ s to 1\d\.\d+ s\): the file ends inside a chunk"
 
 
+#: So that nothing is guessed.
+STATED = ("--participant", "ann", "--condition", "force", "--cycle", "1")
 BREAKS = [cut_tail, wrong_crc, cut_in_the_last_second]
 
 
 def test_an_intact_log_gives_exit_code_0(written, navirl):
     path = written("zstd")
-    assert navirl("extract", path, "-o", "demos.json").stderr == ""
+    assert navirl("extract", path, *STATED, "-o", "demos.json").stderr == ""
     assert navirl("inspect", "--check", path).stderr == ""
     assert load_recording(path, LoadOptions(strict=True)).damage == ()
 
@@ -74,7 +76,7 @@ def test_an_intact_log_gives_exit_code_0(written, navirl):
 def test_a_damaged_log_is_used_and_its_damage_listed(written, navirl, broken):
     path = written("zstd")
     words = broken(path)
-    result = navirl("extract", path, "-o", "demos.json", code=3)
+    result = navirl("extract", path, *STATED, "-o", "demos.json", code=3)
     assert re.search(rf"^navirl: .*run\.mcap: (bytes .*: )?{words}", result.stderr, re.MULTILINE)
     # at most a note on the gap is added
     assert len([line for line in result.stderr.splitlines() if "gaps of more than" not in line]) == 1

@@ -17,7 +17,15 @@ from blocks import blocks_of, run_page  # noqa: E402
 
 PAGES = [page for page in sorted((ROOT / "docs").rglob("*.md")) if not {"_generated", "_build"} & set(page.parts)]
 #: Pages whose blocks take long, or that show what another page shows; the build of the site runs the gallery.
-SLOW = {"choose-trials.md", "figures.md", "gallery.md", "index.md", "published-study.md", "several-rewards.md"}
+SLOW = {
+    "choose-trials.md",
+    "figures.md",
+    "gallery.md",
+    "index.md",
+    "nav2-study.md",
+    "published-study.md",
+    "several-rewards.md",
+}
 
 
 @pytest.mark.parametrize(

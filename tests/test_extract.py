@@ -69,7 +69,8 @@ def test_the_push_is_found_with_its_force_in_the_map_frame(make):
 
 def test_a_threshold_within_the_noise_is_reported(make):
     settings = ExtractSettings(push=PushSettings(begins_n=0.2))
-    (note,) = extract(make(), settings).notes
+    note, guessed = extract(make(), settings).notes
+    assert guessed.startswith("run.mcap: guessed, because it is not stated: ")
     assert note.startswith("run.mcap: without contact the force varies by 0.0")
     assert "contacts from 0.2 N on may be noise; raise `contact_force` to 0." in note
 
@@ -243,7 +244,7 @@ def test_a_trial_with_a_gap_in_poses_or_wrench_is_refused(make):
             extract(replace(recording, wrench=dead), ExtractSettings())
     short = (seconds < 6.0) | (seconds > 6.3)
     gapped = replace(wrench, t_ns=wrench.t_ns[short], force_n=wrench.force_n[short])
-    (note,) = extract(replace(recording, wrench=gapped), ExtractSettings()).notes
+    note, _ = extract(replace(recording, wrench=gapped), ExtractSettings()).notes
     assert note == "run.mcap: gaps of more than 0.1 s in the wrench: 1; the force is interpolated linearly"
 
 
@@ -291,6 +292,11 @@ def test_a_map_with_occupied_cells_on_the_path_is_reported(make):
 def test_people_in_a_wall_or_off_the_map_are_noted(make):
     d = one(make(obstacles=((30, 27),)), people_m=((1.95 + 0.03, 1.2), (90.0, 0.0)))
     assert d.notes == (
+        "people by `person`: 2; in the log: 1; those of the log are ignored",
+        (
+            "`person` 90.00,0.00 contradicts the log, whose nearest person is 88.00 m from there, at x 2.00 m, y 0.90 "
+            "m; the log's people are ignored"
+        ),
         "a person at x 1.98 m, y 1.20 m stands in a wall of the map",
         "a person at x 90.00 m, y 0.00 m stands off the map",
     )

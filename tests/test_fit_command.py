@@ -373,3 +373,22 @@ def test_an_interval_that_reaches_a_bound_does_not_go_beyond(files):
     (shown,) = (row for row in rows if row[:2] == ["a_g", "95"])
     assert float(shown[2]) < 0.0
     assert shown[3:] == "- above, up to the parameter's bound 0".split()  # noqa: SIM905
+
+
+def test_a_fit_without_people_says_so_before_it_starts(files, tmp_path, navirl, monkeypatch):
+    someone = read_demonstrations(files / "demos.json")[:4]
+    nobody = [replace(one, people_m=np.zeros((0, 2))) for one in someone]
+    for name, some in (("nobody", nobody), ("one", [*nobody[:3], someone[3]])):
+        write_json(tmp_path / f"{name}.json", "demonstrations", demonstrations_document(some, [], {}), force=False)
+
+    def started(*_, **__):
+        raise RewardError("started")
+
+    monkeypatch.setattr("navirl_cli.commands.fit.fit_reward", started)
+    warned, ended = navirl("fit", "nobody.json", "-o", "reward.json", code=1).stderr.splitlines()
+    assert warned == (
+        "navirl: none of the 4 demonstrations has people, so that the personal space (a_p, sigma_p) cannot be learnt "
+        "from them; extract them again with a people topic, or give places with --person x,y"
+    )
+    assert ended == "navirl: started"
+    assert navirl("fit", "one.json", "-o", "reward.json", code=1).stderr == "navirl: started\n"

@@ -128,7 +128,8 @@ def test_without_a_push_to_the_side_there_is_no_number(tmp_path, pushes):
     extraction = extract(loaded, ExtractSettings(gain=True))
     assert extraction.gain is None
     assert extraction.notes[-1] == "run.mcap: the gain is unknown, because no trial holds a push to the side"
-    assert extract(loaded, ExtractSettings()).notes == ()
+    stated = {"participant": "ann", "condition": Condition.FORCE, "cycle": 1}
+    assert extract(loaded, ExtractSettings(**stated)).notes == ()
 
 
 def test_joystick_trials_do_not_count(recording):

@@ -48,6 +48,7 @@ def folder(tmp_path_factory):
         (folder / "logs" / log.name).symlink_to(log)
     files = forge.participant()
     (folder / "runs.tar.gz").write_bytes(forge.archive({f"runs/p1/{name}": data for name, data in files.items()}))
+    (folder / "trials.csv").write_text(CliRunner().invoke(cli, ["inspect", str(SAMPLES[0]), "--trials"]).stdout)
     fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
@@ -80,7 +81,7 @@ def test_every_option_stands_in_a_section(words, command):
     assert len(set(sections)) == len(sections)
     assert re.search(r"\nHelp:\n +-h, --help .*\n\nExamples:", text)
     for option in options(command):
-        assert len(re.findall(rf"^  (-\w, )?{option.opts[-1]}\b", text, re.MULTILINE)) == 1
+        assert len(re.findall(rf"^  (-\w, )?{option.opts[-1]}(?![\w-])", text, re.MULTILINE)) == 1
 
 
 @pytest.mark.parametrize(("words", "command"), EVERY)
@@ -110,9 +111,11 @@ def marked(line):
 #: Words after which each command prints its table, but for those that print only the name of a file.
 TABLES = {
     "inspect": ["p01.mcap"],
+    "annotate": ["p01.mcap", "trials.csv", "-o", "new.mcap"],
     "extract": ["p01.mcap", "-o", "new.json"],
     "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
     "evaluate": ["demos.json"],
+    "plan": ["reward.json", "--scene", "demos.json"],
     "import-study": ["runs.tar.gz", "-o", "new"],
     "simulate": ["--participants", "1", "-o", "new"],
     "study": ["demos.json", "--samples", "20", "-o", "new"],
@@ -139,7 +142,16 @@ def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch
 
 
 #: Objects whose keys are names of the data: participants, groups, modalities, metrics, reasons.
-BY_DATA = {"participants", "metrics", "completion_s", "missing", "missing_on_grid", "by_participant"}
+BY_DATA = {
+    "parameters",
+    "reward_by_term",
+    "participants",
+    "metrics",
+    "completion_s",
+    "missing",
+    "missing_on_grid",
+    "by_participant",
+}
 
 
 def keys_in(document, by_data=False):

@@ -11,7 +11,9 @@ from navirl_cli.evaluation.metrics import METRICS
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.terms import TERMS
 
-KINDS = ("demonstrations", "reward", "metrics", "study")
+#: Artefacts of version 1 and those that came later.
+FIRST = ("demonstrations", "reward", "metrics", "study")
+KINDS = (*FIRST, "plan")
 ROOT = Path(__file__).parent.parent
 UNITS = ("s", "hz", "m", "m2", "m_s", "m_s2", "m_s3", "1_m", "rad", "n", "n_s", "m_s_n", "j", "share", "bytes")
 #: Counts, numbers of order, statistics without a unit.
@@ -25,6 +27,8 @@ WITHOUT = {
         "demonstrations",
         "paths",
         "trials",
+        "trial",
+        "labelled",
         "messages",
         "gaps",
         "cells",
@@ -48,7 +52,7 @@ WITHOUT = {
 #: Nanoseconds are for times of day only: beside them, n_s is newton seconds.
 TIMES_NS = {"start_ns", "end_ns"}
 #: Nats, which are numbers without a unit.
-NATS = "log_likelihood"
+NATS = ("log_likelihood", "log_probability", "reward_by_term")
 #: Values of what the rest of their object or the key around them names: a metric, or a parameter beside its unit.
 STATISTICS = {
     *("mean", "standard_deviation", "half_interval", "monte_carlo_error", "exact", "mean_difference", "margin"),
@@ -56,6 +60,7 @@ STATISTICS = {
     *("value", "values", "standard_error", "standard_error_clustered", "standard_errors", "standard_errors_clustered"),
     *(
         "bias_subtracted",
+        "parameters",
         "covariance",
         "covariance_clustered",
         "theta",
@@ -74,7 +79,7 @@ def has_unit(key):
 
 
 def follows(key):
-    return has_unit(key) or NATS in key or key in WITHOUT | TIMES_NS | STATISTICS | NAMES
+    return has_unit(key) or any(name in key for name in NATS) or key in WITHOUT | TIMES_NS | STATISTICS | NAMES
 
 
 def resolved(schema, root):
@@ -137,7 +142,7 @@ def test_numbers_of_schemas_have_their_unit_in_their_key(kind):
     assert {key for key in numeric_keys(schema, schema) if not (follows(key) or key in names)} == set()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FIRST)
 def test_numbers_of_files_have_their_unit_in_their_key(kind):
     document = read_json(ROOT / "tests" / "version1" / f"{kind}.json", kind)
     assert wrong_keys(document, {"by_participant", "completion_s", "missing"}) == set()
@@ -155,9 +160,12 @@ def test_numbers_of_what_commands_print_have_their_unit_in_their_key(navirl, tmp
     (tmp_path / "runs" / "p1").mkdir(parents=True)
     for name, data in forge.participant().items():
         (tmp_path / "runs" / "p1" / name).write_bytes(data)
+    (tmp_path / "trials.csv").write_text(navirl("inspect", log, "--trials").stdout)
     for words, data in (
         (("inspect", log), ()),
         (("extract", log, "-o", "demos.json"), ()),
+        (("inspect", log, "--trials"), ()),
+        (("annotate", log, "trials.csv", "-o", "copy.mcap"), ()),
         (("extract", log, "-o", "gain.json", "--gain"), ()),
         (("import-study", "runs", "-o", "logs"), {"completion_s"}),
     ):

@@ -17,8 +17,8 @@ ORDERS = {
         ["demos"],
         ["irl"],
         ["evaluation"],
-        ["study", "simulation", "published"],
-        ["artefacts"],
+        ["study", "simulation", "published", "planning"],
+        ["artefacts", "export"],
         ["reports"],
         ["figures"],
         ["api"],
@@ -38,12 +38,18 @@ ORDERS = {
         ["__init__", "damage", "records"],
         ["batches", "raw", "sniff"],
         ["chunks", "compressed", "summary"],
-        ["resync"],
+        ["resync", "insertion"],
         # what the pieces define reaches the survey through `batches.Definitions`, which both are given
         ["survey", "opener"],
         ["log_file"],
     ],
-    "navirl_cli.logs.messages": [["__init__", "schema"], ["layout"], ["decode", "writer"], ["series"], ["reader"]],
+    "navirl_cli.logs.messages": [
+        ["__init__", "schema", "single"],
+        ["layout"],
+        ["decode", "writer"],
+        ["series"],
+        ["reader"],
+    ],
     "navirl_cli.logs.tf": [["__init__", "rotations"], ["transforms"], ["tree"]],
 }
 

@@ -71,7 +71,7 @@ def test_leaves_in_sequences():
         ("transforms", "'transforms' is not a number, text, time or fixed array of numbers"),
         ("transforms[]", r"'transforms\[\]' is not a number, text, time or fixed array of numbers"),
         ("transforms.header.stamp", "'header' in .* is below a field that is not a single message"),
-        ("transforms[].header[].stamp", r"'header\[\]' in .* is not a sequence, or is inside another one"),
+        ("transforms[].header[].stamp", r"'header\[\]' in .* is not a sequence, or is inside two others"),
         ("transforms[].pose", "TransformStamped has no field 'pose' of .*; its fields are header, child_frame_id, tr"),
     ):
         with pytest.raises(SchemaError, match=message):

@@ -60,8 +60,12 @@ def test_a_declared_condition_stands_and_contact_stays_unknown(tmp_path):
 
 
 def test_neither_odometry_nor_wrench_leaves_no_clock(tmp_path):
-    with pytest.raises(LogError, match=r"expected odometry or a wrench, whose stamps are the recording's clock"):
+    with pytest.raises(LogError, match=r"no odometry, and tf does not give poses in its place"):
         loaded(tmp_path, Run(wrench_topics=(), odometry=False), Forces.IGNORED)
+    (bare := tmp_path / "bare").mkdir()
+    with pytest.raises(LogError, match=r"no odometry: expected a topic of type nav_msgs/Odometry") as caught:
+        loaded(bare, Run(wrench_topics=(), odometry=False, map_to_odom=False, sensor_mounted=False), Forces.IGNORED)
+    assert "found none of them" not in str(caught.value)
 
 
 def test_the_file_holds_what_is_unknown(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 
 from navirl_cli.errors import FrameError, LogError
 from navirl_cli.logs.findings import Kind
-from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import read
 from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.columns import Columns
@@ -106,6 +106,22 @@ def test_tf_alone(load):
     assert recording.notes == ("run.mcap: no odometry: poses are those of 'base_footprint' in tf",)
     check_true(recording, run, np.arange(201) / 10, (5.0, 0.0))
     assert recording.velocity_m_s is None
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 0.5])
+def test_tf_alone_without_a_wrench(load, ahead_s):
+    """Stamps of the frame that moves most often are the clock, not those of a localisation that stamps ahead."""
+    run = Run()
+    run.log.messages = [one for one in run.log.messages if one.topic != "/wrench"]
+    run.tf(run.true, parent="odom", child="base_link")
+    for at in range(0, 20, 1):
+        ahead = int(nav.unix(at + ahead_s))
+        run.log.add("/tf", nav.tf(nav.transform(ahead, "map", "odom", 5.0, 0.0)), int(nav.unix(at)))
+    recording = load(run, forces=Forces.IGNORED)
+    assert recording.notes == ("run.mcap: no odometry: poses are those of 'base_link' in tf",)
+    x, y, _ = run.true((recording.t_ns - nav.START_NS) / 1e9)
+    assert recording.xy_m == pytest.approx(np.column_stack([x + 5.0, y]), abs=0.02)
+    assert recording.t_ns[-1] - recording.t_ns[0] > 18e9
 
 
 def test_tf_that_does_not_move_is_no_source(load):
@@ -351,3 +367,50 @@ def test_a_real_robots_odometry_agrees_with_its_localisation():
     apart = np.hypot(*(placed - amcl.stacked("px", "py")[both]).T)
     assert np.median(apart) < 0.005
     assert np.quantile(apart, 0.95) < 0.01
+
+
+# two publishers
+
+#: When the poses of the second publisher come, s after those of the first, which come ten times a second.
+PATTERNS = {
+    "in turn": lambda _: 0.05,
+    "together": lambda _: 0.0,
+    "first one, then the other": lambda k: 0.01 if k % 2 else -0.01,
+    "more seldom": lambda k: 0.05 if k % 4 == 0 else None,
+}
+
+
+def two_publishers(apart_m, pattern):
+    log = nav.drive(20.0, skip=["/odom"])
+    for k in range(200):
+        for late_s, y in ((0.0, 0.0), (PATTERNS[pattern](k), apart_m)):
+            if late_s is not None:
+                second = k / 10 + late_s
+                log.add("/odom", nav.odometry(int(nav.unix(second)), 0.4 * second, y), int(nav.unix(second)) + 10**6)
+    return log
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("apart_m", [0.3, 1.5, 30.0])
+def test_poses_of_two_publishers_are_refused(tmp_path, pattern, apart_m):
+    message = rf"^run.mcap: topic /odom: poses jump to and fro between two tracks {apart_m:.2f} m apart \(\d+ times\)"
+    with pytest.raises(LogError, match=message):
+        load_recording(two_publishers(apart_m, pattern).write(tmp_path / "run.mcap"))
+
+
+def test_a_robot_that_turns_back_again_and_again_is_one(tmp_path):
+    log = nav.drive(40.0, skip=["/odom"])
+    for second in np.arange(0.0, 40.0, 0.1).tolist():
+        # at 1.5 m/s to and fro
+        x = abs((1.5 * second) % 2.0 - 1.0)
+        log.add("/odom", nav.odometry(int(nav.unix(second)), x, 0.0), int(nav.unix(second)))
+    assert len(load_recording(log.write(tmp_path / "run.mcap")).t_ns) == 400
+
+
+def test_noise_is_no_second_track(tmp_path):
+    rng = np.random.default_rng(3)
+    log = nav.drive(20.0, skip=["/odom"])
+    for second in np.arange(0.0, 20.0, 0.1).tolist():
+        x, y = rng.normal(0.0, 0.15, 2)
+        log.add("/odom", nav.odometry(int(nav.unix(second)), 0.4 * second + x, y), int(nav.unix(second)))
+    assert len(load_recording(log.write(tmp_path / "run.mcap")).t_ns) == 200

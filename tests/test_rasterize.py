@@ -43,6 +43,23 @@ def test_smooth_curves_against_the_naive_rule(seed):
     assert [tuple(cell) for cell in path.tolist()] == twin(line, GRID, Rule.STUDY)
 
 
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("curve", [make.smooth_curve, make.shaken])
+def test_blocks_of_segments_change_nothing(monkeypatch, seed, curve):
+    line = curve(seed)
+    try:
+        expected = rasterize(line, GRID).tolist()
+    except DemonstrationError as error:
+        expected = str(error)
+    for size in (1, 3, 10_000):
+        monkeypatch.setattr("navirl_cli.demos.rasterize._BLOCK", size)
+        try:
+            found = rasterize(line, GRID).tolist()
+        except DemonstrationError as error:
+            found = str(error)
+        assert found == expected
+
+
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("curve", [make.smooth_curve, make.shaken])
 @pytest.mark.parametrize("rule", CROSSING)

@@ -4,7 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from shutil import copy
 
+import nav_log as nav
 import pytest
+from robot_log import Run, write_run
 
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
@@ -49,3 +51,45 @@ def test_progress_ends_at_all_bytes():
     calls = []
     extracted(LOGS / "p01.mcap", progress=lambda done, total: calls.append((done, total)))
     assert calls[-1] == ((LOGS / "p01.mcap").stat().st_size,) * 2
+
+
+@pytest.mark.parametrize("count", [2, 13])
+def test_when_all_fail_each_reason_is_told_once_with_its_count(tmp_path, count):
+    without_map = write_run(tmp_path / "no_map.mcap", Run(map=False))
+    paths = [copy(without_map, tmp_path / f"p{number:02}.mcap") for number in range(count)]
+    without_map.unlink()
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"no log at all")
+    with ThreadPoolExecutor(2) as pool, pytest.raises(NavirlError) as caught:
+        extracted(*paths, broken, executor=pool)
+    text = str(caught.value)
+    assert text.startswith(f"none of the {count + 1} logs can be used: {count} logs: no map: expected a topic of type ")
+    assert text.count("no map") == 1
+    assert "broken.mcap: " in text
+    assert len(text) < 1000
+
+
+def test_all_reasons_of_a_log_are_told_each_once(tmp_path):
+    path = write_run(tmp_path / "run.mcap", Run(map=False, wrench_topics=(), map_to_odom=False))
+    with pytest.raises(NavirlError) as caught:
+        extracted(path)
+    text = str(caught.value)
+    positions = [text.index(part) for part in ("no wrench: ", "no map: ", "transform from 'odom' to 'map'")]
+    assert positions == sorted(positions)
+    assert text.count("the log holds /") == text.count("run.mcap: ") == 1
+
+
+def test_topics_without_end_are_not_all_listed(tmp_path):
+    log = nav.Log()
+    for number in range(300):
+        log.add(f"/camera_{number:03}/joy", nav.joy(1 + number, [0.0]), 1 + number)
+    with pytest.raises(NavirlError) as caught:
+        extracted(log.write(tmp_path / "run.mcap"))
+    assert "/camera_019/joy (sensor_msgs/Joy) and 280 more" in str(caught.value)
+    assert len(str(caught.value)) < 3000
+
+
+def test_what_was_lost_is_told_where_no_trial_is_left(tmp_path):
+    path = write_run(tmp_path / "run.mcap", Run(odometry_nan=345))
+    with pytest.raises(NavirlError, match=r"no trial became a demonstration: trial 1: .*; 345 messages on /odom hold "):
+        extracted(path)

@@ -12,7 +12,7 @@ from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.messages.reader import scan
 from navirl_cli.logs.messages.writer import LogWriter
 from navirl_cli.logs.recording import PUBLISHED_RECORD
-from navirl_cli.logs.roles.session import session_of
+from navirl_cli.logs.roles.session import session_of, session_values
 
 GOAL_NS = 1_700_000_001_500_000_000
 
@@ -123,3 +123,60 @@ def test_a_trial_ends_at_the_time_in_the_record(tmp_path):
 def test_an_end_before_the_goal_is_refused(tmp_path, stop):
     with pytest.raises(LogError, match=r"stop_ns .* must be a whole number after t_ns"):
         told(tmp_path, {"trials": json.dumps([{"t_ns": GOAL_NS, "stop_ns": stop}])})
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        ('{"t_ns": 1e300}', "must be whole numbers"),
+        (f'{{"t_ns": {2**63}}}', "must be times of 64 bits"),
+        (f'{{"t_ns": 1, "stop_ns": {2**63}}}', "must be times of 64 bits"),
+        ('{"t_ns": 1, "cycle": 1000001}', "must be whole numbers"),
+        ('{"t_ns": 1, "participant": 3}', "participant 3 must be a text"),
+        ('{"t_ns": 1, "nominal_m": [[0, 0], [1e308, 0]]}', "must be points of two numbers, at most 1e.08 m from 0"),
+        ('{"t_ns": 1, "people_m": [[0, 1e9]]}', "must be points of two numbers, at most 1e.08 m from 0"),
+        ('{"t_ns": 1, "people_m": [[0]]}', "must be points of two numbers"),
+        ('{"t_ns": 1, "people_m": "x"}', "could not convert"),
+        (f'{{"t_ns": 1, "people_m": {[[0, 0]] * 1001}}}', "people_m has 1001 points, where 0 to 1000 are possible"),
+        (f'{{"t_ns": 1, "nominal_m": {[[0, 0]] * 10001}}}', "nominal_m has 10001 points, where 2 to 10000"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(tmp_path, entry, why):
+    with pytest.raises(LogError, match=why) as caught:
+        told(tmp_path, {"trials": f"[{entry}]"})
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(("key", "value"), [("robot_radius_m", "1e300"), ("laid_out_m_s", "1e9")])
+def test_a_robot_is_neither_huge_nor_that_fast(tmp_path, key, value):
+    with pytest.raises(LogError, match=f"key {key}: expected .* is not a number above 0, at most"):
+        told(tmp_path, {key: value})
+
+
+def test_halves_of_characters_are_replaced(tmp_path):
+    values = {
+        "trials": r'[{"t_ns": 1, "set": "a\ud800b", "participant": "\ud83d\ude00"}]',
+        "completion_s": r'{"\udc00": [1]}',
+    }
+    session = told(tmp_path, values)
+    assert (session.declared[0].set, session.declared[0].participant) == ("a\ufffdb", "\U0001f600")
+    assert list(session.completion_s) == ["\ufffd"]
+
+
+def test_a_session_and_its_record_are_the_same(tmp_path):
+    entries = [
+        {"t_ns": 5, "stop_ns": 9, "participant": "ä", "cycle": 1, "condition": "force", "set": "s", "people_m": []},
+        {"t_ns": 6, "nominal_m": [[0.1, 1 / 3], [2, 3]], "people_m": [[1e-9, -7.25]]},
+    ]
+    values = {
+        "participant": "ann",
+        "trials": json.dumps(entries),
+        "robot_radius_m": "0.4",
+        "laid_out_m_s": "0.5",
+        "completion_s": json.dumps({"force": [18.8]}),
+    }
+    session = told(tmp_path, values)
+    again = told(tmp_path, session_values(session))
+    assert again == session
+    assert session_values(again) == session_values(session)
+    assert session_values(told(tmp_path)) == {}

@@ -161,8 +161,8 @@ def test_renamed_files_of_a_bag_are_read_and_reported(tmp_path):
         ("[w_0.db3.zstd]", {"storage": '""'}, "a ROS 2 bag in SQLite"),
         (
             "[w_0.mcap]",
-            {"compression": "zstd", "mode": "MESSAGE"},
-            "one whose messages are compressed one by one (compression_mode: MESSAGE)",
+            {"compression": "lz4", "mode": "MESSAGE"},
+            "one whose messages are compressed one by one (compression_mode: MESSAGE) by 'lz4', not by zstd",
         ),
     ],
 )

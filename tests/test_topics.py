@@ -251,20 +251,40 @@ def test_a_topic_without_messages_is_reported(choose_topics, tmp_path):
 
 def test_a_topic_that_is_only_announced_does_not_count():
     silent = Topic("/wrench", WRENCH, 0)
-    both = {"/wrench": silent, "/ft": Topic("/ft", WRENCH, 3)}
+    both = (silent, Topic("/ft", WRENCH, 3))
     assert named(choose("run.mcap", both, {}), "wrench") == ["/ft"]
-    alone = choose("run.mcap", {"/wrench": silent}, {})["wrench"]
+    alone = choose("run.mcap", (silent,), {})["wrench"]
     assert "; /wrench has no messages; record" in alone.problem
 
 
-def test_the_type_of_most_messages_counts(tmp_path):
+def test_a_topic_of_two_types_stands_once_for_each(tmp_path):
     log = nav.Log()
-    log.add("/place", nav.pose_stamped(1, 0, 0), 1)
+    log.add("/place", nav.odometry(1, 0, 0), 1)
     for number in range(3):
-        log.add("/place", nav.odometry(number + 2, 0, 0), number + 2)
+        log.add("/place", nav.pose_stamped(number + 2, 0, 0), number + 2)
     path = log.write(tmp_path / "run.mcap", channel_for=dict.fromkeys((1, 2, 3), 1))
-    (topic,) = topics_of([scan(path)]).values()
-    assert (topic.type_name, topic.count) == (ODOMETRY, 3)
+    topics = topics_of([scan(path)])
+    assert [(one.name, one.type_name, one.count) for one in topics] == [("/place", POSE, 3), ("/place", ODOMETRY, 1)]
+    for wish in ({}, {"odometry": ["/place"]}):
+        (chosen,) = choose("run.mcap", topics, wish)["odometry"].topics
+        assert chosen.type_name == ODOMETRY
+
+
+@pytest.mark.parametrize("topic", ["/odom", "/tf", "/wrench", "/map"])
+def test_messages_of_another_type_on_a_topic_change_nothing(tmp_path, topic):
+    plain, shared = nav.drive(4.0), nav.drive(4.0)
+    for number in range(60):
+        shared.add(topic, nav.joy(int(nav.unix(number / 20)), [0.0]), int(nav.unix(number / 20)))
+    ordered = sorted(shared.messages, key=lambda one: one.log_time_ns)
+    own = {number: 1 for number, one in enumerate(ordered) if one.typename == JOY}
+    expected = load_recording(plain.write(tmp_path / "plain.mcap"))
+    found = load_recording(shared.write(tmp_path / "run.mcap", channel_for=own))
+    assert found.xy_m == pytest.approx(expected.xy_m)
+    assert found.damage == ()
+    (note,) = found.notes
+    assert note.startswith(f"run.mcap: {topic} holds messages of several types: ")
+    assert "sensor_msgs/Joy (60)" in note
+    assert set(note.partition("; used: ")[2].split(", ")) > {"sensor_msgs/Joy"}
 
 
 # through a complete recording

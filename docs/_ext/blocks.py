@@ -1,5 +1,7 @@
 """The code blocks of a page, and how they run: in order, in one folder, with the sample logs linked in.
 
+Commands are those of navirl, with patterns and ``> file``.
+
 A comment above a block that cannot run states the reason: ``<!-- block: skip REASON -->``.
 """
 
@@ -85,8 +87,11 @@ def run_page(page: Path, folder: Path) -> str:
 
 def _run(line: str, page: Path) -> str:
     """Run a command of navirl in this process, which saves its start."""
+    line, _, target = line.partition(" > ")
     words = [word for one in shlex.split(line) for word in (sorted(glob.glob(one)) or [one])]  # noqa: PTH207 relative
     assert words[0] == "navirl", f"{page.name}: {line!r} does not run here: mark its block as skipped, with the reason"
     result = CliRunner().invoke(cli, words[1:], prog_name="navirl", catch_exceptions=False)
     assert result.exit_code == 0, f"{page.name}: {line}: {result.output}"
+    if target:
+        Path(target).write_text(result.stdout, encoding="utf-8")
     return result.stdout

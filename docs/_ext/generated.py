@@ -21,7 +21,7 @@ from navirl_cli.reports.evaluation import metrics_table
 
 HERE = Path(__file__).parent.parent
 GENERATED = HERE / "_generated"
-KINDS = ("demonstrations", "reward", "metrics", "study")
+KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 
 
 class Markdown(click.HelpFormatter):
@@ -117,7 +117,7 @@ def message_types() -> Iterator[tuple[str, str]]:
         needed = "Needed by `extract`." if role.needed else "Optional."
         table = written(Table((Column("message type"), Column("fields that are read")), tuple(rows)), Format.MARKDOWN)
         rule = f" Where several topics fit: {escaped(role.rule)}." if role.rule else ""
-        parts.append(f"## {role.name}\n\n{needed}{rule}\n\n{unescaped(table)}\n")
+        parts.append(f"### {role.name}\n\n{needed}{rule}\n\n{unescaped(table)}\n")
     yield "message-types.md", "\n".join(parts)
 
 

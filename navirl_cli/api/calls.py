@@ -31,6 +31,7 @@ from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, r
 from navirl_cli.demos.contact import PushSettings
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.extract import ExtractSettings
+from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import Recordings, extract_recordings
 from navirl_cli.demos.trials import Split
@@ -54,6 +55,7 @@ from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.overview import Overview, overview
 from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.logs.roles.session import MOST_CYCLES
 from navirl_cli.logs.sources import sources_of
 from navirl_cli.parallel import cores
 from navirl_cli.reports.extraction import published_notes
@@ -64,7 +66,11 @@ from navirl_cli.reports.fit import warnings as fit_warnings
 def extract(
     *logs: PathLike,
     split: str = "goal",
+    trials: PathLike | None = None,
     participant: str | None = None,
+    condition: str | None = None,
+    cycle: int | None = None,
+    set: str | None = None,  # noqa: A002 the option's name
     robot_radius: float | None = None,
     resolution: float = 0.1,
     rasterizer: str = "study",
@@ -78,6 +84,7 @@ def extract(
     frame: str | None = None,
     no_wrench: bool = False,
     wrench_frame: str | None = None,
+    force_scale: float = 1.0,
     time: str = "header",
     join: bool = False,
     strict: bool = False,
@@ -91,7 +98,12 @@ def extract(
     Args:
         *logs: MCAP files, rosbag2 folders, folders of recordings, or patterns.
         split: Trials begin at a new "goal", after a "stop", or the log is one trial ("none").
+        trials: CSV table that states participant, condition, cycle and the like of each trial, as
+            ``navirl inspect --trials`` writes it to be filled in.
         participant: Name of the participant, instead of the name in the log or of the file.
+        condition: Condition of all trials, instead of that in the log or by contact.
+        cycle: Cycle of all trials, instead of that in the log.
+        set: Purpose of all trials besides the main task, instead of that in the log.
         robot_radius: Radius by which the map is inflated, m. None: from the log's session record, else 0.3.
         resolution: Side of the cells, m.
         rasterizer: Rule that turns a path into cells: "study", "crossed" or "chain".
@@ -105,6 +117,7 @@ def extract(
         frame: Frame of all results, instead of the map's frame.
         no_wrench: Ignore forces; also for logs without a wrench. Contact is then unknown.
         wrench_frame: Frame of the wrench, instead of the frame in its header.
+        force_scale: Newtons for the unit of the wrench's forces: 1000 for kN, 0.001 for mN.
         time: Time of a message: the stamp in its "header", or the time of receipt in the "log".
         join: Treat all logs as parts of one recording.
         strict: Refuse damaged logs.
@@ -124,8 +137,8 @@ def extract(
     """
     if not logs:
         raise ArgumentError("`logs`: expected at least one log, found none")
-    if no_wrench and (gain or wrench_frame):
-        raise ArgumentError("`no_wrench` excludes `gain` and `wrench_frame`, which need the wrench")
+    if no_wrench and (gain or wrench_frame or force_scale != 1):
+        raise ArgumentError("`no_wrench` excludes `gain`, `wrench_frame` and `force_scale`, which need the wrench")
     settings = ExtractSettings(
         split=chosen(Split, split, "split"),
         resolution_m=within("resolution", resolution, 0.01, 2),
@@ -136,6 +149,9 @@ def extract(
             cutoff_hz=within("wrench_filter", wrench_filter, 0.01, 1000),
         ),
         participant=participant,
+        condition=None if condition is None else _condition(condition),
+        cycle=None if cycle is None else int(within("cycle", cycle, 1, MOST_CYCLES)),
+        set=set,
         people_m=points_in(person) or None,
         goal_m=None if goal is None else points_in(goal)[0],
         gain=gain,
@@ -146,22 +162,28 @@ def extract(
         time=chosen(TimeSource, time, "time"),
         frame=frame,
         wrench_frame=wrench_frame,
+        force_scale=within("force_scale", force_scale, 0, 1e9, above=True),
         occupancy=None if map_file is None else read_map(map_file),
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,
     )
+    table = None if trials is None else Path(trials)
+    labels = None if table is None else read_labels(table)
     with _workers(executor) as workers:
-        found = extract_recordings(logs, settings, options, join=join, executor=workers)
-    return _extracted(found, settings, options, map_file)
+        found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=workers)
+    said = settings_document(settings, options, map_file, table)
+    return _extracted(found, said, [one for one in (map_file, table) if one is not None])
 
 
-def _extracted(
-    found: Recordings, settings: ExtractSettings, options: LoadOptions, map_file: Path | None
-) -> Demonstrations:
+def _condition(name: str) -> Condition:
+    """A condition that can be stated."""
+    return Condition(one_of([one.value for one in Condition if one is not Condition.UNKNOWN], name, "condition"))
+
+
+def _extracted(found: Recordings, said: dict[str, Any], files: Sequence[Path]) -> Demonstrations:
     """The extracted trials as their file holds them, so that numbers are the same with and without a file."""
     demonstrations = found.demonstrations()
-    inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
-    said = settings_document(settings, options, map_file)
+    inputs = [*found.inputs, *(Input.of(file) for file in files)]
     _warn(found.lost, depth=4)
     return Demonstrations(
         demonstrations_of(demonstrations_document(demonstrations, inputs, said), "demonstrations"),
@@ -169,7 +191,7 @@ def _extracted(
         settings=said,
         notes=[*found.notes(demonstrations), *published_notes(found.extractions)],
         lost=found.lost,
-        gain=gain_document([(one.log, one.gain) for one in found.extractions]) if settings.gain else None,
+        gain=gain_document([(one.log, one.gain) for one in found.extractions]) if said["gain"] else None,
     )
 
 

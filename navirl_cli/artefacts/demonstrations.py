@@ -46,13 +46,16 @@ def demonstrations_document(
     }
 
 
-def settings_document(settings: "ExtractSettings", options: "LoadOptions", map_file: Path | None) -> dict[str, Any]:
+def settings_document(
+    settings: "ExtractSettings", options: "LoadOptions", map_file: Path | None, trials: Path | None
+) -> dict[str, Any]:
     """The settings of an extraction.
 
     Args:
         settings: Of the extraction.
         options: The user's choices about the logs.
         map_file: The map in place of the log's.
+        trials: The table of labels.
     """
     from navirl_cli.logs.load import Forces
 
@@ -61,8 +64,10 @@ def settings_document(settings: "ExtractSettings", options: "LoadOptions", map_f
         "time": options.time.value,
         "frame": options.frame,
         "wrench_frame": options.wrench_frame,
+        "force_scale": options.force_scale,
         "wrench": options.forces is not Forces.IGNORED,
         "map": None if map_file is None else map_file.name,
+        "trials": None if trials is None else trials.name,
     }
 
 

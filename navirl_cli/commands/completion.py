@@ -100,7 +100,7 @@ def topics(ctx: click.Context, _incomplete: str) -> Iterator[str]:
     found = topics_of(scan(path) for source in (sources_of(logs) if logs else ()) for path in source.files)
     for role in ROLES:
         types = {one.name for one in role.message_types}
-        yield from [f"{role.name}={one.name}" for one in found.values() if one.type_name in types] or [f"{role.name}="]
+        yield from [f"{role.name}={one.name}" for one in found if one.type_name in types] or [f"{role.name}="]
 
 
 class WholeWords(BashComplete):

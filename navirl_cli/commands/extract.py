@@ -13,18 +13,23 @@ from navirl_cli.commands.shared import (
     echo_json,
     finish,
     force_option,
+    frame_option,
+    goal_option,
     json_option,
     logs_argument,
     merged,
     output_option,
     say,
+    split_option,
     topic_option,
     topics_by_role,
 )
-from navirl_cli.commands.types import Choice, FilePath, Number, Point
+from navirl_cli.commands.types import Choice, Count, FilePath, Number, Point
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
+from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings
+from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.demos.trials import Split
@@ -33,6 +38,7 @@ from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.logs.roles.session import MOST_CYCLES
 from navirl_cli.reports.extraction import gain_table, published_notes, trial_table
 
 
@@ -41,7 +47,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
     examples=[
         Example("A trial for each goal that the logs announce", "navirl extract p01.mcap p02.mcap -o demos.json"),
         Example("All logs of a folder, with a named topic", "navirl extract logs --topic wrench=/wrench -o demos.json"),
-        Example("Larger cells, and the robot's gain", "navirl extract p01.mcap --resolution 0.2 --gain -o demos.json"),
+        Example("Labels of each trial from a table", "navirl extract p01.mcap --trials trials.csv -o demos.json"),
     ],
 )
 @logs_argument
@@ -51,11 +57,18 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
     click.option(
         "--map", "map_file", type=FilePath, help="Nav2 map YAML beside its pgm or png, instead of the map in the log."
     ),
-    click.option("--frame", help="Frame of all results, instead of the map's frame."),
+    frame_option,
     click.option(
         "--no-wrench", is_flag=True, help="Ignore forces; also for logs without a wrench. Contact is then unknown."
     ),
     click.option("--wrench-frame", help="Frame of the wrench, instead of the frame in its header."),
+    click.option(
+        "--force-scale",
+        metavar="FACTOR",
+        default=1.0,
+        type=Number(0, 1e9, min_open=True),
+        help="Newtons for the unit of the wrench's forces: 1000 for kN, 0.001 for mN.  [default: 1]",
+    ),
     click.option(
         "--time",
         "time_source",
@@ -69,18 +82,28 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 )
 @section(
     "Trials",
-    click.option(
-        "--split",
-        type=Choice([split.value for split in Split]),
-        default=Split.GOAL.value,
-        show_default=True,
-        help="Start a trial at every new goal or after every stop, or take the log as one trial.",
-    ),
-    click.option("--goal", type=Point(), help="Goal in the map frame, m, instead of the goals in the log."),
+    split_option,
+    goal_option,
     click.option(
         "--person", "people", multiple=True, type=Point(), help="Position of a person in the map frame, m; repeatable."
     ),
+)
+@section(
+    "Labels",
+    click.option(
+        "--trials",
+        type=FilePath,
+        help="CSV table of participant, condition, cycle and the like of each trial, as navirl inspect --trials writes "
+        "it to be filled in.",
+    ),
     click.option("--participant", help="Participant, instead of the name in the log or of the file."),
+    click.option(
+        "--condition",
+        type=Choice([one.value for one in Condition if one is not Condition.UNKNOWN]),
+        help="Condition of all trials, instead of that in the log or by contact.",
+    ),
+    click.option("--cycle", type=Count(1, MOST_CYCLES), help="Cycle of all trials, instead of that in the log."),
+    click.option("--set", "part", help="Purpose of all trials besides the main task, instead of that in the log."),
 )
 @section(
     "Contacts",
@@ -121,7 +144,11 @@ def extract(
     logs: tuple[Path, ...],
     output: Path,
     split: str,
+    trials: Path | None,
     participant: str | None,
+    condition: str | None,
+    cycle: int | None,
+    part: str | None,
     robot_radius: float | None,
     resolution: float,
     rasterizer: str,
@@ -135,6 +162,7 @@ def extract(
     frame: str | None,
     no_wrench: bool,
     wrench_frame: str | None,
+    force_scale: float,
     time_source: str,
     join: bool,
     strict: bool,
@@ -155,9 +183,10 @@ def extract(
     pass through the sensor is not measured.
     """
     chosen = topics_by_role(topics)
-    if no_wrench and (gain or wrench_frame or "wrench" in chosen):
-        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame and --topic wrench=/NAME.")
-    check_output(output, [*logs, *([] if map_file is None else [map_file])], force=force)
+    if no_wrench and (gain or wrench_frame or force_scale != 1 or "wrench" in chosen):
+        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame, --force-scale and --topic wrench=/NAME.")
+    files = [one for one in (map_file, trials) if one is not None]
+    check_output(output, [*logs, *files], force=force)
     settings = ExtractSettings(
         split=Split(split),
         resolution_m=resolution,
@@ -165,6 +194,9 @@ def extract(
         rasterizer=Rule(rasterizer),
         push=PushSettings(begins_n=contact_force, cutoff_hz=wrench_filter),
         participant=participant,
+        condition=None if condition is None else Condition(condition),
+        cycle=cycle,
+        set=part,
         people_m=people or None,
         goal_m=goal,
         gain=gain,
@@ -174,23 +206,25 @@ def extract(
         time=TimeSource(time_source),
         frame=frame,
         wrench_frame=wrench_frame,
+        force_scale=force_scale,
         occupancy=None if map_file is None else read_map(map_file),
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
         strict=strict,
     )
+    labels = None if trials is None else read_labels(trials)
     with bytes_bar("extract") as update:
-        found = extract_recordings(logs, settings, options, join=join, progress=update)
+        found = extract_recordings(logs, settings, options, join=join, labels=labels, progress=update)
     demonstrations = found.demonstrations()
-    inputs = [*found.inputs, *([] if map_file is None else [Input.of(map_file)])]
-    document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file))
+    inputs = [*found.inputs, *map(Input.of, files)]
+    document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file, trials))
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
     write_json(output, "demonstrations", document, force=force)
-    trials, gains = trial_table(demonstrations), document.get("gain")
+    table, gains = trial_table(demonstrations), document.get("gain")
     if as_json:
-        echo_json({"trials": trials.records(), "gain": gains})
+        echo_json({"trials": table.records(), "gain": gains})
     else:
-        echo(to_text([trials, *([gain_table(gains)] if gains else [])]))
+        echo(to_text([table, *([gain_table(gains)] if gains else [])]))
     for line in merged([*found.notes(demonstrations), *published_notes(found.extractions)]):
         say(line)
     finish(found.lost)

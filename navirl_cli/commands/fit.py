@@ -169,6 +169,8 @@ def fit(
     if earlier is not None and not initial:
         start = earlier.reward
     questions.check(evidence, start)
+    for line in remarks(chosen, earlier, chosen_by=conditions):
+        say(line)
     found, analyses, lost = answers(
         evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
     )
@@ -180,7 +182,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
+    for line in warnings(document):
         say(line)
     finish(lost)
 

@@ -11,9 +11,10 @@ import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.commands import completion
-from navirl_cli.commands.types import Count, FilePath, OutputPath, RoleTopic
+from navirl_cli.commands.types import Choice, Count, FilePath, OutputPath, Point, RoleTopic
 from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.trials import Split
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.files import check_writable
 
@@ -36,6 +37,15 @@ topic_option = click.option(
     shell_complete=completion.topics,
     help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
 )
+frame_option = click.option("--frame", help="Frame of all results, instead of the map's frame.")
+split_option = click.option(
+    "--split",
+    type=Choice([split.value for split in Split]),
+    default=Split.GOAL.value,
+    show_default=True,
+    help="Start a trial at every new goal or after every stop, or take the log as one trial.",
+)
+goal_option = click.option("--goal", type=Point(), help="Goal in the map frame, m, instead of the goals in the log.")
 
 
 def samples_option(default: int = 1000) -> Callable[[Function], Function]:

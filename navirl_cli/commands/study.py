@@ -33,7 +33,8 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.text import to_text
-from navirl_cli.files import Input, check_writable, new_folder, replacing
+from navirl_cli.errors import ArtefactError
+from navirl_cli.files import Input, check_writable, replacing, swapped_folder
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
@@ -97,8 +98,9 @@ def study(
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
-    with new_folder(output / "figures") as figures:
-        _check_files(output, force=force)
+    _check_files(output, force=force)
+    with swapped_folder(output) as folder:
+        (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
         demonstrations = given.demonstrations
         with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
@@ -109,17 +111,17 @@ def study(
         settings = {"samples": samples, "seed": seed, "levels": levels}
         numbers = study_document(found, given.cells, bars)
         document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
-        write_json(output / SUMMARY, "study", document, force=force)
+        write_json(folder / SUMMARY, "study", document, force=force)
         kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
-        write_json(output / DEMOS, "demonstrations", kept, force=force)
+        write_json(folder / DEMOS, "demonstrations", kept, force=force)
         pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
-            drawn = draw_study(found, pooled, bars, figures, force=force, progress=update)
+            drawn = draw_study(found, pooled, bars, folder / "figures", force=force, progress=update)
         problems = [line for one in (*found.participants, found.pooled) for line in one.problems]
         lost = [*given.lost, *problems, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]
         context = StudyContext(given.logs, [*notes, *lost], given.cells, drawn, bars, samples, seed)
-        _write_report(output, found, context, force=force)
+        _write_report(folder, found, context, force=force)
     if as_json:
         echo_json(document)
     else:
@@ -177,8 +179,11 @@ def _check_files(output: Path, *, force: bool) -> None:
     from navirl_cli.reports.study import FIGURES
 
     names = [output / "figures" / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
+    if output.exists() and not output.is_dir():
+        raise ArtefactError(f"{output}: expected the name of a folder, found a file; choose another `output`")
     for path in (*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names):
-        check_writable(path, force=force)
+        if path.parent.is_dir():
+            check_writable(path, force=force)
 
 
 def _completion(results: Sequence[Extraction]) -> dict[str, dict[str, tuple[float, ...]]]:

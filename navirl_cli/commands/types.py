@@ -89,3 +89,19 @@ class OutputPath(click.Path):
             endings = f"{', '.join(others)} or {last}" if others else last
             self.fail(f"expected a name that ends in {endings}, found {path.name!r}", param, ctx)
         return path
+
+
+class Pose(click.ParamType):  # type: ignore[type-arg]
+    """A pose as ``x,y`` or ``x,y,yaw`` in m and rad."""
+
+    name = "x,y[,yaw]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Parse two or three numbers."""
+        try:
+            pose = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            pose = ()
+        if len(pose) not in {2, 3} or not all(map(isfinite, pose)):
+            self.fail(f"expected two or three finite numbers in m, m and rad as x,y,yaw, found {value!r}", param, ctx)
+        return pose

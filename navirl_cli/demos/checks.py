@@ -3,7 +3,7 @@
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.contact import Pushes, PushSettings, missing_s
+from navirl_cli.demos.contact import MIN_CONTACT_S, Pushes, PushSettings, hysteresis, missing_s
 from navirl_cli.demos.grid import OCCUPIED_FROM, Grid, is_costmap
 from navirl_cli.demos.lines import path_length_m, thinned
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Trial
@@ -12,6 +12,10 @@ from navirl_cli.logs.recording import Recording
 
 #: A contact's force must exceed the noise this many times.
 NOISE_MARGIN = 5.0
+#: Peaks of pushes by hand lie between, N; others are in another unit.
+LEAST_PEAK_N, MOST_PEAK_N = 0.5, 2000.0
+#: A person whom the user places this far from all of the log's is another one, m.
+SAME_PLACE_M = 0.5
 #: A path of cells is longer than its line; if it is shorter than this share, a loop is missing.
 LOOPS = 0.9
 #: More than this share of occupied cells means that the robot drove on another map; fewer occur beside walls.
@@ -66,6 +70,17 @@ def check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
             )
 
 
+def check_end(people: FloatArray, end: FloatArray, radius_m: float, by: str) -> None:
+    """Refuse a person whom the user places where the robot ended."""
+    for x, y in people:
+        distance = float(np.hypot(x - end[0], y - end[1]))
+        if distance < radius_m:
+            raise DemonstrationError(
+                f"{by} {x:.2f},{y:.2f} stands where the path ends, which is its goal ({distance:.2f} m from the "
+                f"robot's centre, radius {radius_m:.2f} m); correct the place"
+            )
+
+
 def check_goal(grid: Grid, start: FloatArray, goal: tuple[float, float]) -> None:
     """Refuse a goal that the robot did not reach and could not have reached."""
     cell = grid.cells_of(goal)
@@ -90,9 +105,28 @@ def recording_notes(recording: Recording, pushes: Pushes | None, push: PushSetti
     return [f"{recording.log}: {note}" for note in notes]
 
 
+def _unit_note(pushes: Pushes) -> str:
+    """A hint where the forces look like pushes, but no hand pushes so; empty otherwise."""
+    size = np.hypot(*pushes.force_n.T)
+    peak_n = float(size.max(initial=0.0))
+    if LEAST_PEAK_N <= peak_n <= MOST_PEAK_N or not peak_n:
+        return ""
+    unit, factor = ("kN", "1000") if peak_n < LEAST_PEAK_N else ("mN", "0.001")
+    lasting = hysteresis(size, 0.9 * peak_n, 0.5 * peak_n)
+    lasts_s = (pushes.t_ns[lasting[:, 1]] - pushes.t_ns[lasting[:, 0]]) / 1e9
+    rest_n = float(np.median(size))
+    if peak_n < NOISE_MARGIN * max(rest_n, pushes.noise_n) or lasts_s.max(initial=0.0) < MIN_CONTACT_S:
+        return ""
+    only = " only" if peak_n < LEAST_PEAK_N else ""
+    return (
+        f"the wrench rises to {peak_n:.3g} N{only}, in the shape of pushes, but no hand pushes so; if its unit is "
+        f"{unit}, give `force_scale` {factor}"
+    )
+
+
 def _wrench_notes(pushes: Pushes, push: PushSettings) -> list[str]:
     """What is unusual about the forces."""
-    notes = []
+    notes = [text] if (text := _unit_note(pushes)) else []
     # a threshold within the noise finds false contacts
     least = NOISE_MARGIN * pushes.noise_n
     if push.begins_n < least:
@@ -125,6 +159,43 @@ def jump_notes(recording: Recording, start_ns: int, stop_ns: int) -> list[str]:
     largest = max(jumps, key=lambda jump: jump.size_m)
     how = "jumps" if len(jumps) == 1 else f"jumps {len(jumps)} times, at most"
     return [f"the localisation {how} by {largest.size_m:.2f} m at {(largest.t_ns - start_ns) / 1e9:.1f} s"]
+
+
+def placed_notes(given: FloatArray, logged: FloatArray | None, xy_m: FloatArray, radius_m: float, by: str) -> list[str]:
+    """What contradicts the people whom the user placed.
+
+    Args:
+        given: (p, 2) m, the user's people.
+        logged: (q, 2) m, those of the log in this trial; None where it has no messages about people.
+        xy_m: (n, 2) m, the driven path.
+        radius_m: The robot's.
+        by: The argument or column that places them.
+    """
+    notes = []
+    for person in given:
+        nearest_m = float(np.hypot(*(xy_m - person).T).min())
+        if nearest_m < radius_m:
+            notes.append(
+                f"the robot drove through {_at(person, by)}: its centre passed {nearest_m:.2f} m from there, radius "
+                f"{radius_m:.2f} m; correct the place"
+            )
+    if logged is None:
+        return notes
+    if len(given) != len(logged):
+        notes.append(f"people by {by}: {len(given)}; in the log: {len(logged)}; those of the log are ignored")
+    for person in given if len(logged) else ():
+        away_m = np.hypot(*(logged - person).T)
+        x, y = logged[int(away_m.argmin())]
+        if away_m.min() > SAME_PLACE_M:
+            notes.append(
+                f"{_at(person, by)} contradicts the log, whose nearest person is {away_m.min():.2f} m from there, at x "
+                f"{x:.2f} m, y {y:.2f} m; the log's people are ignored"
+            )
+    return notes
+
+
+def _at(person: FloatArray, by: str) -> str:
+    return f"{by} {person[0]:.2f},{person[1]:.2f}"
 
 
 def people_notes(recording: Recording, people: FloatArray) -> list[str]:

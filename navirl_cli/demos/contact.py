@@ -58,17 +58,11 @@ def pushes_of(recording: Recording, settings: PushSettings) -> Pushes:
     any point of a rigid body, and the torque, which depends on the lever arm, is not used.
 
     Raises:
-        LogError: The recording holds too few wrench messages.
+        LogError: The recording holds no wrench.
     """
     wrench = recording.wrench
-    if wrench is None or len(wrench.t_ns) < 50:
-        found = 0 if wrench is None else len(wrench.t_ns)
-        raise LogError(f"{recording.log}: expected a wrench of at least 50 messages, found {found}")
-    if wrench.t_ns[0] > recording.t_ns[-1] or wrench.t_ns[-1] < recording.t_ns[0]:
-        raise LogError(
-            f"{recording.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
-            f"{(int(wrench.t_ns[0]) - int(recording.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
-        )
+    if wrench is None:
+        raise LogError(f"{recording.log}: expected a wrench, found none")
     seconds = (wrench.t_ns - wrench.t_ns[0]) / 1e9
     bias, quiet = bias_of(seconds, wrench.force_n, settings.begins_n)
     base = np.einsum("...ij,...j->...i", wrench.to_base[..., :2, :], wrench.force_n - bias)

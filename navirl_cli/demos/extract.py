@@ -3,13 +3,13 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.demos.checks import (
     check_cells,
+    check_end,
     check_gaps,
     check_goal,
     check_start,
@@ -17,19 +17,20 @@ from navirl_cli.demos.checks import (
     jump_notes,
     path_notes,
     people_notes,
+    placed_notes,
     recording_notes,
 )
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
 from navirl_cli.demos.grid import Grid, grid_from_occupancy
+from navirl_cli.demos.labelling import guess_notes, labelled, record_notes, row_notes, stated_of
+from navirl_cli.demos.labels import Label
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
-from navirl_cli.demos.trials import Split, Trial, trials_of
-from navirl_cli.errors import DemonstrationError, NavirlError
-from navirl_cli.logs.recording import Declared, Published, Recording
-
-Entry = TypeVar("Entry", Declared, Published)
+from navirl_cli.demos.trials import Split, Trial, entries_by_trial, trials_of, with_goal
+from navirl_cli.errors import MOST_NAMES, DemonstrationError, NavirlError, joined
+from navirl_cli.logs.recording import Declared, Recording
 
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
 STICK_DEAD_ZONE = 0.1
@@ -48,7 +49,11 @@ class ExtractSettings:
     robot_radius_m: float | None = None
     rasterizer: Rule = Rule.STUDY
     push: PushSettings = field(default_factory=PushSettings)
+    #: Of all trials, in place of what the logs or the labels state.
     participant: str | None = None
+    condition: Condition | None = None
+    cycle: int | None = None
+    set: str | None = None
     #: (x, y) m, map frame, each: in place of the log's people.
     people_m: tuple[tuple[float, float], ...] | None = None
     #: In place of the log's goals; in a log without goals from its start on.
@@ -80,7 +85,7 @@ class Extraction(ByContent):
     completion_s: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
-def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
+def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[Label] = ()) -> Extraction:
     """Turn one recording into demonstrations.
 
     A trial that cannot become a demonstration is skipped with the reason.
@@ -88,34 +93,43 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
     Args:
         recording: A log's content in one frame and on one clock.
         settings: The user's choices.
+        labels: What the experimenter states of the trials, over what the log's session record states.
 
     Returns:
         Demonstrations with ids ``participant/number``.
 
     Raises:
-        NavirlError: No trial of the recording is usable.
+        NavirlError: No trial of the recording is usable, or a label fits none.
     """
-    recording = _with_goal(recording, settings)
+    recording, trials, stated = _trials(recording, settings, labels)
     occupancy, radius_m = recording.occupancy, _radius_m(recording, settings)
     grid = grid_from_occupancy(occupancy.data, occupancy.resolution_m, occupancy.origin_m, radius_m).resampled(
         settings.resolution_m
     )
     pushes = None if recording.wrench is None else pushes_of(recording, settings.push)
-    trials = trials_of(recording, settings.split)
-    participant = settings.participant or recording.session.participant or recording.log.partition(".mcap")[0]
     found: list[Demonstration] = []
     skipped: list[tuple[int, str]] = []
-    for number, trial in enumerate(trials, start=1):
-        name = f"{participant}/{number}"
+    for number, (trial, declared) in enumerate(zip(trials, stated, strict=True), start=1):
+        name = f"{declared.participant or recording.log.partition('.mcap')[0]}/{number}"
         try:
-            found.append(_demonstration(recording, trial, pushes, grid, settings, name))
+            found.append(_demonstration(recording, trial, pushes, grid, settings, name, declared))
         except NavirlError as error:
             skipped.append((number, str(error)))
     if not found:
-        reasons = "; ".join(_grouped(skipped)) or "no goal is announced while poses are recorded"
-        raise DemonstrationError(f"{recording.log}: no trial became a demonstration: {reasons}")
+        reasons = _grouped(skipped) or ["no goal is announced while poses are recorded"]
+        prefix = f"{recording.log}: "
+        # what was lost on the way may be the cause
+        raise DemonstrationError(
+            f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
+        )
     lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
+    own = {(number := _number(one)): stated[number - 1] for one in found}
+    notes += [
+        *record_notes(recording, trials),
+        *row_notes(recording, trials, labels, own),
+        *guess_notes(recording, own.values()),
+    ]
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
@@ -127,7 +141,7 @@ def extract(recording: Recording, settings: ExtractSettings) -> Extraction:
         damage=recording.damage,
         notes=tuple(notes),
         gain=gain,
-        published=_published(recording, found),
+        published=_published(recording, trials, found),
         completion_s=recording.session.completion_s,
     )
 
@@ -142,18 +156,10 @@ def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
     for extraction in extractions:
         counted = Counter({one.participant: extraction.trials for one in extraction.demonstrations})
         for one in extraction.demonstrations:
-            number = before[one.participant] + int(one.id.rpartition("/")[2])
+            number = before[one.participant] + _number(one)
             unique.append(replace(one, id=f"{one.participant}/{number}"))
         before += counted
     return unique
-
-
-def _with_goal(recording: Recording, settings: ExtractSettings) -> Recording:
-    """The recording with the user's goal in place of its own; in one without goals it is announced at the start."""
-    if settings.goal_m is None:
-        return recording
-    times = recording.goal_t_ns if len(recording.goal_t_ns) else recording.t_ns[:1]
-    return replace(recording, goal_t_ns=times, goal_m=np.tile(settings.goal_m, (len(times), 1)))
 
 
 def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
@@ -162,13 +168,24 @@ def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
     for number, reason in skipped:
         by_reason.setdefault(reason, []).append(str(number))
     return [
-        f"trial{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: {reason}"
-        for reason, numbers in by_reason.items()
+        f"trial{'s' if len(numbers) > 1 else ''} {_numbers(numbers)}: {reason}" for reason, numbers in by_reason.items()
     ]
 
 
+def _numbers(numbers: Sequence[str]) -> str:
+    """Numbers of trials, of many the first ones."""
+    more = f" and {len(numbers) - MOST_NAMES} others" if len(numbers) > MOST_NAMES else ""
+    return ", ".join(numbers[:MOST_NAMES]) + more
+
+
 def _demonstration(
-    recording: Recording, trial: Trial, pushes: Pushes | None, grid: Grid, settings: ExtractSettings, name: str
+    recording: Recording,
+    trial: Trial,
+    pushes: Pushes | None,
+    grid: Grid,
+    settings: ExtractSettings,
+    name: str,
+    declared: Declared,
 ) -> Demonstration:
     """One trial as a demonstration."""
     span = slice(trial.first, trial.stop)
@@ -177,13 +194,12 @@ def _demonstration(
     check_travel(xy)
     check_gaps(recording, trial, pushes)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
-    people = _people(recording, settings, start_ns, stop_ns)
     radius_m = _radius_m(recording, settings)
+    people = _people(recording, settings, declared, trial, radius_m)
     check_start(people.people_m, xy[0], radius_m)
     cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
         check_goal(free, xy[0], goal)
-    declared = _nearest(recording.session.declared, start_ns, stop_ns) or Declared(start_ns)
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
     observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
     notes = [*path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
@@ -209,7 +225,7 @@ def _demonstration(
         set=declared.set,
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
-        notes=(*notes, *people.notes, *people_notes(recording, people.people_m)),
+        notes=(*notes, *people.notes),
     )
 
 
@@ -221,11 +237,20 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
     return cells, free
 
 
-def _people(recording: Recording, settings: ExtractSettings, start_ns: int, stop_ns: int) -> People:
-    """The people of a trial: those placed by the user, else those of the log."""
-    if settings.people_m is not None:
-        return People(np.array(settings.people_m))
-    return people_during(recording, start_ns, stop_ns)
+def _people(
+    recording: Recording, settings: ExtractSettings, declared: Declared, trial: Trial, radius_m: float
+) -> People:
+    """The people of a trial: those placed by the user, else by labels, with what contradicts them; else the log's."""
+    xy = recording.xy_m[trial.first : trial.stop]
+    logged = people_during(recording, int(recording.t_ns[trial.first]), int(recording.t_ns[trial.stop - 1]))
+    by = "`person`" if settings.people_m is not None else "people_m"
+    placed = declared.people_m if settings.people_m is None else np.array(settings.people_m)
+    if placed is None:
+        return replace(logged, notes=(*logged.notes, *people_notes(recording, logged.people_m)))
+    check_end(placed, xy[-1], radius_m, by)
+    known = logged.people_m if len(recording.people_t_ns) else None
+    notes = placed_notes(placed, known, xy, radius_m, by)
+    return People(placed, notes=(*notes, *(people_notes(recording, placed) if len(placed) else ["nobody was there"])))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:
@@ -243,22 +268,32 @@ def _radius_m(recording: Recording, settings: ExtractSettings) -> float:
     return next(radius for radius in radii if radius is not None)
 
 
-def _published(recording: Recording, found: Iterable[Demonstration]) -> dict[str, bool]:
+def _published(recording: Recording, trials: Sequence[Trial], found: Iterable[Demonstration]) -> dict[str, bool]:
     """Whether cells are as published, by the published path's name; False without a demonstration."""
     known = recording.session.published
     same = dict.fromkeys((entry.name for entry in known), False)
+    by_trial = entries_by_trial(known, recording, trials)
     for one in found:
-        entry = _nearest(known, one.start_ns, one.start_ns + round(one.duration_s * 1e9))
+        entry = by_trial.get(_number(one) - 1)
         if entry is not None:
             same[entry.name] = np.array_equal(entry.cells, one.cells)
     return same
 
 
-def _nearest(entries: Sequence[Entry], start_ns: int, stop_ns: int) -> Entry | None:
-    """The entry of a metadata record for a trial: the one whose time is nearest to the trial's start."""
-    nearest = min(entries, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
-    # an entry far from the start belongs to another trial
-    return nearest if nearest is not None and abs(nearest.t_ns - start_ns) < (stop_ns - start_ns) else None
+def _number(one: Demonstration) -> int:
+    """The number of a demonstration's trial."""
+    return int(one.id.rpartition("/")[2])
+
+
+def _trials(
+    recording: Recording, settings: ExtractSettings, labels: Sequence[Label]
+) -> tuple[Recording, list[Trial], list[Declared]]:
+    """The recording with goal and labels in place of its own, its trials, and what is stated of each."""
+    recording = with_goal(recording, settings.goal_m)
+    trials = trials_of(recording, settings.split)
+    recording = replace(recording, session=labelled(recording, trials, labels))
+    given = {name: getattr(settings, name) for name in ("participant", "condition", "cycle", "set")}
+    return recording, trials, stated_of(recording, trials, given)
 
 
 def _observed(contacts: Sequence[Contact] | None, *, steered: bool) -> tuple[Condition, bool | None]:

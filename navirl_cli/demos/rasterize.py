@@ -88,8 +88,16 @@ def _nearest_first(line: FloatArray, ends: IntArray, grid: Grid) -> IntArray:
     return np.array(path)
 
 
+#: Segments of a line are looked at in blocks of so many.
+_BLOCK = 64
+
+
 class _Rest:
-    """The remaining part of a line, as segments of which the first is cut shorter and shorter."""
+    """The remaining part of a line, as segments of which the first is cut shorter and shorter.
+
+    Only blocks of segments that can hold the nearest point are looked at, which their bounding boxes decide: the time
+    for a path would else grow with the square of its length.
+    """
 
     def __init__(self, line: FloatArray) -> None:
         #: By axis: where segments end, where they start, and how far they lead.
@@ -98,10 +106,38 @@ class _Rest:
         self.squared = (self.along**2).sum(axis=0)
         self.squared[self.squared == 0] = 1.0  # their start is their only point
         self.first = 0
+        starts = np.arange(0, self.start.shape[1], _BLOCK)
+        #: (2, blocks) corners of the boxes around the segments of each block; cut segments stay inside.
+        self.low = np.minimum.reduceat(np.minimum(self.start, self.end), starts, axis=1)
+        self.high = np.maximum.reduceat(np.maximum(self.start, self.end), starts, axis=1)
 
     def cut_nearest(self, options: IntArray) -> int:
         """Cut the line at its point nearest to any of the (k, 2) options; the number of that option."""
-        left = slice(self.first, None)
+        block, count = self.first // _BLOCK, self.start.shape[1]
+        stop = min((block + 1) * _BLOCK, count)
+        left: slice | IntArray = slice(self.first, stop)
+        squared, share = self._distances(options, left)
+        if stop < count:
+            (low_x, low_y), (high_x, high_y) = self.low[:, block + 1 :], self.high[:, block + 1 :]
+            (x0, y0), (x1, y1) = options.min(axis=0), options.max(axis=0)
+            # from the box around the options to that of each block
+            dx, dy = np.maximum(low_x - x1, x0 - high_x), np.maximum(low_y - y1, y0 - high_y)
+            away = np.maximum(dx, 0.0) ** 2 + np.maximum(dy, 0.0) ** 2
+            near = np.flatnonzero(away <= squared.min()) + block + 1
+            if near.size:
+                others = (near[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
+                left = np.concatenate([np.arange(self.first, stop), others[others < count]])
+                squared, share = self._distances(options, left)
+        option, place = divmod(int(squared.argmin()), squared.shape[1])
+        k = self.first + place if isinstance(left, slice) else int(left[place])
+        self.first = k
+        self.start[:, k] += share[option, place] * self.along[:, k]
+        self.along[:, k] = self.end[:, k] - self.start[:, k]
+        self.squared[k] = (self.along[:, k] ** 2).sum() or 1.0
+        return int(option)
+
+    def _distances(self, options: IntArray, left: slice | IntArray) -> tuple[FloatArray, FloatArray]:
+        """Squared distances of options to segments, (k, segments), and where on these the nearest points are, 0..1."""
         (sx, sy), (ax, ay) = self.start[:, left], self.along[:, left]
         # few operations on whole arrays: a path takes about sixty of these steps
         dx, dy = options[:, 0, None] - sx, options[:, 1, None] - sy
@@ -110,13 +146,7 @@ class _Rest:
         np.minimum(share, 1.0, out=share)
         dx -= share * ax
         dy -= share * ay
-        option, segment = divmod(int((dx * dx + dy * dy).argmin()), len(sx))
-        self.first += segment
-        k = self.first
-        self.start[:, k] += share[option, segment] * self.along[:, k]
-        self.along[:, k] = self.end[:, k] - self.start[:, k]
-        self.squared[k] = (self.along[:, k] ** 2).sum() or 1.0
-        return option
+        return dx * dx + dy * dy, share
 
 
 @dataclass(frozen=True, eq=False)

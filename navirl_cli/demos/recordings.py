@@ -8,10 +8,13 @@ from pathlib import Path
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
-from navirl_cli.errors import DemonstrationError, LogError, NavirlError
+from navirl_cli.demos.labelling import check_agreement
+from navirl_cli.demos.labels import Label, Labels, labels_by_source
+from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, joined
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
+from navirl_cli.logs.roles.topics import HOLDS
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import map_in_order
 
@@ -29,6 +32,8 @@ class Recordings:
     inputs: tuple[Input, ...]
     #: The recordings that gave none, each with the reason.
     left_out: tuple[str, ...]
+    #: What is unusual about the table of labels, as ``name: text``.
+    label_notes: tuple[str, ...] = ()
 
     def demonstrations(self) -> list[Demonstration]:
         """All demonstrations, with unique ids."""
@@ -36,7 +41,7 @@ class Recordings:
 
     def notes(self, demonstrations: Iterable[Demonstration]) -> list[str]:
         """What is unusual about recordings and about their demonstrations, as ``name: text``."""
-        notes = [note for one in self.extractions for note in one.notes]
+        notes = [*self.label_notes, *(note for one in self.extractions for note in one.notes)]
         return [*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]
 
     @property
@@ -51,6 +56,7 @@ def extract_recordings(
     options: LoadOptions,
     *,
     join: bool = False,
+    labels: Labels | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Recordings:
@@ -61,6 +67,7 @@ def extract_recordings(
         settings: Of the extraction.
         options: The user's choices about the logs.
         join: Whether all are pieces of one recording.
+        labels: What the experimenter states of the trials.
         executor: Where to work on several recordings; by default local processes.
         progress: Called with bytes done and bytes in all.
 
@@ -68,16 +75,21 @@ def extract_recordings(
         Their demonstrations, and the recordings that gave none.
 
     Raises:
-        NavirlError: No recording gave a demonstration.
+        NavirlError: No recording gave a demonstration, or labels do not fit the logs or the settings.
     """
     refused: list[LogError] = []
     # where all are pieces of one recording none may be missing
     sources = sources_of(logs, join=join, refused=None if join else refused)
+    rows, label_notes = _rows(labels, sources, settings)
     # a lone recording is read here, so that the progress can follow its bytes
     work = partial(_extracted, settings=settings, options=options, progress=progress if len(sources) == 1 else None)
     good: dict[tuple[str, ...], _Result] = {}
     failed: list[NavirlError] = [*refused]
-    for source, result in _counted(sources, map_in_order(work, sources, executor), progress):
+    for source, result in _counted(
+        sources, map_in_order(work, list(zip(sources, rows, strict=True)), executor), progress
+    ):
+        if isinstance(result, LabelError):
+            raise result
         if isinstance(result, NavirlError):
             failed.append(result)
         elif (key := tuple(sorted(file.sha256 for file in result[0]))) in good:
@@ -87,12 +99,37 @@ def extract_recordings(
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
-        raise DemonstrationError("none of the logs can be used: " + "; ".join(str(error) for error in failed))
+        raise DemonstrationError(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),
         tuple(f"left out: {error}" for error in failed),
+        tuple(label_notes),
     )
+
+
+def _rows(
+    labels: Labels | None, sources: Sequence[Source], settings: ExtractSettings
+) -> tuple[list[tuple[Label, ...]], list[str]]:
+    """The rows of labels of each recording, and notes on the others."""
+    if labels is None:
+        return [()] * len(sources), []
+    stated = {name: (name, getattr(settings, name)) for name in ("participant", "condition", "cycle", "set")}
+    radius, people = ("robot_radius", settings.robot_radius_m), ("person", settings.people_m)
+    check_agreement(labels, {**stated, "robot_radius_m": radius, "people_m": people})
+    return labels_by_source(labels, sources)
+
+
+def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
+    """Each reason once, with the log or the number of logs that it concerns; the commonest first."""
+    logs: dict[str, list[str]] = {}
+    for error in failed:
+        log, colon, reason = str(error).partition(": ")
+        # of the topics that a log holds, another log may hold others
+        key = (reason if colon else log).partition(HOLDS)[0]
+        logs.setdefault(key, []).append(log if colon else "")
+    ordered = sorted(logs.items(), key=lambda item: -len(item[1]))
+    return [f"{own[0] if len(own) == 1 else f'{len(own)} logs'}: {reason}" for reason, own in ordered]
 
 
 def _counted(
@@ -109,13 +146,14 @@ def _counted(
 
 
 def _extracted(
-    source: Source, settings: ExtractSettings, options: LoadOptions, progress: Progress | None
+    job: tuple[Source, tuple[Label, ...]], settings: ExtractSettings, options: LoadOptions, progress: Progress | None
 ) -> _Result | NavirlError:
     """One recording's files and demonstrations, or the reason why it gave none."""
+    source, labels = job
     try:
         with ThreadPoolExecutor(1) as pool:
             hashes = pool.submit(lambda: tuple(Input.of(path) for path in source.files))
-            extraction = extract(load_recording(source, options, progress), settings)
+            extraction = extract(load_recording(source, options, progress), settings, labels)
             return hashes.result(), extraction
     except NavirlError as error:
         return error

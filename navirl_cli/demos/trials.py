@@ -1,13 +1,18 @@
 """Where one trial ends and the next begins."""
 
-from dataclasses import dataclass
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TypeVar
 
 import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.logs.recording import Recording
+from navirl_cli.logs.recording import Declared, Published, Recording
+
+Entry = TypeVar("Entry", Declared, Published)
 
 #: A slower robot stands, m/s; window over which the speed is measured, s.
 STANDING_M_S = 0.04
@@ -68,12 +73,39 @@ def trials_of(recording: Recording, split: Split) -> list[Trial]:
         return [Trial(0, len(recording.t_ns), None)]
     if split is Split.STOP:
         return _between_rests(recording.t_ns, standing)
-    if len(recording.goal_t_ns) == 0:
-        raise DemonstrationError(
-            f"{recording.log}: no goal is announced, so that trials cannot be split at goals; "
-            "give one with `goal` x,y, or choose `split` stop or `split` none"
-        )
+    if recording.goal_problem:
+        raise DemonstrationError(recording.goal_problem)
     return _at_goals(recording, standing)
+
+
+def with_goal(recording: Recording, goal_m: tuple[float, float] | None) -> Recording:
+    """The recording with the user's goal in place of its own; in one without goals it is announced at the start."""
+    if goal_m is None:
+        return recording
+    times = recording.goal_t_ns if len(recording.goal_t_ns) else recording.t_ns[:1]
+    return replace(recording, goal_t_ns=times, goal_m=np.tile(goal_m, (len(times), 1)))
+
+
+def entries_by_trial(entries: Sequence[Entry], recording: Recording, trials: Sequence[Trial]) -> dict[int, Entry]:
+    """The entry of a metadata record for each trial, by the trial's place in the list.
+
+    An entry belongs to the trial whose start is nearest, if it is not farther than the trial is long. Of several such
+    entries the nearest one counts.
+
+    Args:
+        entries: In any order.
+        recording: The log.
+        trials: In order of time.
+    """
+    starts = [int(recording.t_ns[trial.first]) for trial in trials]
+    found: dict[int, Entry] = {}
+    for entry in entries if trials else ():
+        after = bisect_left(starts, entry.t_ns)
+        number = min(range(max(after - 1, 0), min(after + 1, len(trials))), key=lambda n: abs(entry.t_ns - starts[n]))
+        away, length = abs(entry.t_ns - starts[number]), int(recording.t_ns[trials[number].stop - 1]) - starts[number]
+        if away < length and (number not in found or away < abs(found[number].t_ns - starts[number])):
+            found[number] = entry
+    return found
 
 
 def speeds_m_s(t_ns: IntArray, xy_m: FloatArray) -> FloatArray:

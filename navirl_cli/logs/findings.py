@@ -22,6 +22,8 @@ _INFO, _NOTE, _LOSS = Severity.INFO, Severity.NOTE, Severity.LOSS
 class Kind(Enum):
     """The kinds of findings: severity, and the sentence in which a finding's fields are filled in."""
 
+    # topics
+    SEVERAL_TYPES = (_NOTE, "{about} holds messages of several types: {detail}")
     # time
     SIMULATED = (
         _INFO,
@@ -118,6 +120,23 @@ class Kind(Enum):
     IMPLAUSIBLE = (_LOSS, "{count} messages on {about} hold implausible values ({detail}); left out")
     OTHER_FRAME = (_LOSS, "{count} messages on {about} are not in frame {detail!r}, as the others are; left out")
     UNPLACED_MESSAGES = (_LOSS, "{count} messages on {about} left out: {detail}")
+    NOT_PEOPLE = (_NOTE, "{count} entries of {about} are not people and are ignored: {detail}")
+    NO_LABELS = (_NOTE, "no entry of {about} has a class; all {count} count as people")
+    GOALS_NOT_REACHED = (
+        _LOSS,
+        "{count} goals of {about} were not reached, and the action does not say where they are; left out",
+    )
+    GOALS_BY_ACTION = (
+        _NOTE,
+        "{about} does not say where goals are; each is placed where the robot was when it was reached",
+    )
+    MISSING_AXIS = (
+        _NOTE,
+        (
+            "force {detail} of {about} is never finite, so it is missing; the sensor's mounting keeps it out of the "
+            "robot's plane, and the other axes suffice"
+        ),
+    )
     UNPLACED_ENTRIES = (_LOSS, "{count} places on {about} left out: {detail}")
 
     def __init__(self, severity: Severity, sentence: str) -> None:

@@ -12,14 +12,16 @@ later stages go on with what there is, so that :func:`follow` finds every reason
 and ``inspect`` shows all (:mod:`~navirl_cli.logs.overview`): both follow the same line and cannot disagree.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from navirl_cli.arrays import ByContent
-from navirl_cli.errors import LogError, NavirlError
+from navirl_cli.errors import LogError, NavirlError, joined
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.findings import Findings, Severity, texts
@@ -31,8 +33,11 @@ from navirl_cli.logs.roles.session import session_of
 from navirl_cli.logs.roles.space import Placed, in_one_frame
 from navirl_cli.logs.roles.tables import read_tables
 from navirl_cli.logs.roles.times import Tables, Timed, on_one_clock
-from navirl_cli.logs.roles.topics import Choice, choose, is_missing, refusal, topics_of
+from navirl_cli.logs.roles.topics import HOLDS, Choice, choose, is_missing, refusal, shared_topics, topics_of, undefined
 from navirl_cli.logs.sources import Source
+
+#: Where the damage of a topic begins in its sentence.
+_DAMAGE: Final = re.compile(r"^.*?: bytes \d+ to \d+: (topic \S+: )?")
 
 
 class Forces(StrEnum):
@@ -55,6 +60,8 @@ class LoadOptions(ByContent):
     frame: str | None = None
     #: The frame that the wrench is given in, in place of its header's.
     wrench_frame: str | None = None
+    #: N for the unit of the wrench's forces, 1000 where they are in kN.
+    force_scale: float = 1.0
     #: A map in place of the log's, in the fixed frame.
     occupancy: Occupancy | None = None
     forces: Forces = Forces.NEEDED
@@ -105,8 +112,19 @@ def load_recording(
         files = [stack.enter_context(open_log(file)) for file in source.files]
         line = follow(source, files, [scan(file) for file in files], options or LoadOptions(), progress)
     if line.recording is None:
-        raise line.refusals[0]
+        raise _refused(source.name, line)
     return line.recording
+
+
+def _refused(log: str, line: Line) -> NavirlError:
+    """All reasons why a log is refused, as an error of the type of the first; at the end what its topics are."""
+    parts = [str(one).partition(HOLDS) for one in line.refusals]
+    reasons = [reason for reason, _, _ in parts]
+    told = " ".join(reasons)
+    # why a topic could not be read is part of its refusal
+    reasons += [text for text in line.lost if _DAMAGE.sub("", text) not in told]
+    held = next((f"{colon}{topics}" for _, colon, topics in parts if topics), "")
+    return type(line.refusals[0])(f"{log}: {joined(reasons, f'{log}: ')}{held}")
 
 
 def follow(
@@ -134,16 +152,25 @@ def follow(
     chosen = _wanted(choices, options)
     refusals: list[NavirlError] = [refusal(log, topics, one) for one in chosen.values() if is_missing(one, chosen)]
     read = read_tables(log, files, chosen, progress)
-    refusals += read.refusals
+    nothing = undefined(log, topics)
+    refusals += [nothing] if nothing else read.refusals
     timed = placed = None
     try:
         timed = on_one_clock(log, read.tables, options.time)
-        placed = in_one_frame(log, timed.tables, options.frame, options.wrench_frame, options.occupancy)
+        placed = in_one_frame(
+            log, timed.tables, options.frame, options.wrench_frame, options.occupancy, options.force_scale
+        )
         refusals += placed.refusals
     except NavirlError as error:
-        refusals.append(error)
-    findings = (*(timed.findings if timed else ()), *(placed.findings if placed else ()))
-    lost = (*map(str, (*source.damage, *read.damage)), *texts(log, findings, Severity.LOSS))
+        # without a clock nothing goes on; why there is none is known where a topic is missing or unread
+        refusals += [] if refusals else [error]
+    findings = (
+        *shared_topics(topics, chosen),
+        *(timed.findings if timed else ()),
+        *(placed.findings if placed else ()),
+    )
+    damage = source.damage if nothing else (*source.damage, *read.damage)
+    lost = (*map(str, damage), *texts(log, findings, Severity.LOSS))
     if lost and options.strict:
         refusals.append(LogError(f"{log}: damaged, which `strict` refuses: {'; '.join(lost)}"))
     recording = None
@@ -191,6 +218,14 @@ def _recording(
         session=session,
         velocity_m_s=placed.poses.velocity_m_s,
         jumps=placed.poses.jumps,
+        no_goal=_no_goal(tables, placed),
         damage=damage,
         notes=notes,
     )
+
+
+def _no_goal(tables: Tables, placed: Placed) -> str:
+    """What became of the goals where none is left."""
+    topics = {columns.topic for columns in tables.get("goal", ())}
+    lost = [str(one) for one in placed.findings if one.about in topics and one.kind.severity is Severity.LOSS]
+    return "" if len(placed.goal_t_ns) else joined(lost)

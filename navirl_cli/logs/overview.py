@@ -3,6 +3,7 @@
 The tables come from indexes, and from the first messages where indexes do not suffice.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -37,6 +38,8 @@ _CLOCKS: Final = ("odometry", "wrench", "tf")
 _SAMPLED: Final = 8
 _STAMP: Final = "header.stamp"
 _TF_STAMP: Final = message_types.TF.fields[_STAMP]
+#: A topic and the full name of one of its types.
+_Key = tuple[str, str]
 _TRANSFORMS: Final = message_types.TF.sequence or ""
 
 
@@ -94,18 +97,29 @@ class Overview:
     @property
     def refusals(self) -> tuple[str, ...]:
         """Why extract refuses the log although each needed role has a topic, in words."""
-        return () if self.needed else tuple(dict.fromkeys(map(str, self.line.refusals)))
+        if self._missing:
+            return ()
+        reasons = [str(one) for one in self.line.refusals]
+        if self.line.recording is not None and self.line.recording.no_goal:
+            reasons.append(self.line.recording.goal_problem)
+        return tuple(dict.fromkeys(reasons))
 
     @property
     def reference_s(self) -> float:
         """Stamps - times of receipt of the topic whose clock counts, s; 0 where none is known."""
-        names = [topic.name for role in _CLOCKS for topic in self.choices[role].topics]
-        offsets = [flow.offset_s for name in names for flow in self.flows if flow.topic.name == name]
+        topics = [topic for role in _CLOCKS for topic in self.choices[role].topics]
+        offsets = [flow.offset_s for topic in topics for flow in self.flows if flow.topic == topic]
         return next((offset for offset in offsets if offset is not None), 0.0)
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """The roles that extract needs and the log does not serve."""
+        """The roles that extract needs and the log does not serve; goals too, at which it splits trials by default."""
+        no_goal = self.line.recording is not None and bool(self.line.recording.goal_problem)
+        return (*self._missing, "goal") if no_goal else self._missing
+
+    @property
+    def _missing(self) -> tuple[str, ...]:
+        """The needed roles without a topic."""
         return tuple(role for role, choice in self.choices.items() if is_missing(choice, self.choices))
 
 
@@ -143,37 +157,44 @@ def overview(
     )
 
 
-def _received(timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], line: Line) -> dict[str, IntArray]:
-    """By topic (n,) ns of receipt, ascending, without those that cannot be true, and without steps of the clock.
+def _received(timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], line: Line) -> dict[_Key, IntArray]:
+    """By topic and type (n,) ns of receipt, ascending, without those that cannot be true, and without steps of clocks.
 
     Where the recorder's clock stepped, other topics than those of extract count only within the times of these.
     """
-    by_topic: dict[str, list[IntArray]] = {}
+    by_key: dict[_Key, list[IntArray]] = {}
     for one, by_channel in timed:
         for channel in one.channels:
-            by_topic.setdefault(channel.topic, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
-    received = {topic: np.sort(np.concatenate(times)) for topic, times in by_topic.items()}
+            by_key.setdefault(_key(channel), []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+    received = {key: np.sort(np.concatenate(times)) for key, times in by_key.items()}
     known = line.timed.received_ns if line.timed and line.timed.repaired else {}
     if known:
         first, last = min(int(times[0]) for times in known.values()), max(int(times[-1]) for times in known.values())
-        within = {topic: times[(times >= first) & (times <= last)] for topic, times in received.items()}
-        return {topic: known.get(topic, times) for topic, times in within.items()}
+        within = {key: times[(times >= first) & (times <= last)] for key, times in received.items()}
+        types = Counter(topic for topic, _ in received)
+        return {key: known.get(key[0], times) if types[key[0]] == 1 else times for key, times in within.items()}
     wrong = wrong_receipts(np.concatenate([np.zeros(0, dtype=np.int64), *received.values()]))
     if wrong.all():
         return received
     parts = np.split(wrong, np.cumsum([len(times) for times in received.values()]))
-    return {topic: times[~part] for (topic, times), part in zip(received.items(), parts, strict=False)}
+    return {key: times[~part] for (key, times), part in zip(received.items(), parts, strict=False)}
 
 
 def _flows(
-    contents: Sequence[Contents], received: Mapping[str, IntArray], start_ns: int, stamped: Mapping[str, Stamped]
+    contents: Sequence[Contents], received: Mapping[_Key, IntArray], start_ns: int, stamped: Mapping[_Key, Stamped]
 ) -> tuple[Flow, ...]:
     """When the messages of each topic came in, by the times of receipt by topic."""
-    encodings = {channel.topic: channel.message_encoding for one in contents for channel in one.channels}
+    encodings = {_key(channel): channel.message_encoding for one in contents for channel in one.channels}
     return tuple(
-        _flow(topic, encodings[name], received[name], start_ns, stamped.get(name))
-        for name, topic in topics_of(contents).items()
+        _flow(topic, encodings[key], received[key], start_ns, stamped.get(key))
+        for topic in topics_of(contents)
+        for key in [(topic.name, topic.type_name)]
     )
+
+
+def _key(channel: Channel) -> _Key:
+    """The topic that a channel belongs to."""
+    return channel.topic, full_name(channel.schema_name)
 
 
 def _flow(topic: Topic, encoding: str, t_ns: IntArray, start_ns: int, stamped: Stamped | None) -> Flow:
@@ -204,10 +225,10 @@ def _offset_s(stamped: Stamped) -> float | None:
     return float(np.median(offset_ns) / NS_PER_S)
 
 
-def _first_messages(files: Sequence[RawFile]) -> dict[str, Stamped]:
+def _first_messages(files: Sequence[RawFile]) -> dict[_Key, Stamped]:
     """Stamps by topic in the first chunks of a recording, of transforms those of each message's first."""
     decoders: dict[Channel, Decoder | None] = {}
-    parts: dict[str, list[DecodedBatch]] = {}
+    parts: dict[_Key, list[DecodedBatch]] = {}
 
     def wanted(channel: Channel) -> bool:
         if channel not in decoders:
@@ -223,8 +244,8 @@ def _first_messages(files: Sequence[RawFile]) -> dict[str, Stamped]:
             if decoder is not None:
                 part = decoder.decode(batch)
                 if len(part.order):
-                    parts.setdefault(batch.channel.topic, []).append(part)
-    return {topic: one for topic, some in parts.items() if (one := _stamped(topic, some)) is not None}
+                    parts.setdefault(_key(batch.channel), []).append(part)
+    return {key: one for key, some in parts.items() if (one := _stamped(key[0], some)) is not None}
 
 
 def _decoder(channel: Channel) -> Decoder | None:

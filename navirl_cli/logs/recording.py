@@ -10,9 +10,9 @@ from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import LogError
 
 #: Name of the metadata record with what only the experimenter knows. Its keys: "participant", a name; and in JSON
-#: "trials", a list of objects with "t_ns", the time of the trial's goal, and any of "stop_ns", "cycle", "condition",
-#: "set" and "nominal_m"; "robot_radius_m"; "completion_s", lists of times by modality; and, where positions came
-#: without times, "laid_out_m_s", the speed at which they were laid out.
+#: "trials", a list of objects with "t_ns", the time of the trial's goal or start, and any of "stop_ns", "participant",
+#: "cycle", "condition", "set", "nominal_m" and "people_m"; "robot_radius_m"; "completion_s", lists of times by
+#: modality; and, where positions came without times, "laid_out_m_s", the speed at which they were laid out.
 SESSION_RECORD = "navirl.session"
 #: Name of the metadata record with cells that were published with the paths: key "cells", a JSON list of objects with
 #: "t_ns" (as above), "name" and "cells" (pairs column, row).
@@ -76,6 +76,10 @@ class Declared(ByContent):
     set: str | None = None
     #: (k, 2) m, fixed frame: the line that the robot's navigation followed.
     nominal_m: FloatArray | None = None
+    #: In place of the session's, where several participants took part.
+    participant: str | None = None
+    #: (p, 2) m, fixed frame: where people stood, none of them with p = 0; None where the log's messages count.
+    people_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +104,10 @@ class Session(ByContent):
     laid_out_m_s: float | None = None
     #: Times in which a course was completed, s, by modality.
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+#: Fewer forces have no bias that could be told from a push.
+LEAST_FORCES = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +136,8 @@ class Recording:
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
+    #: Why there is no goal where there is none, as far as it is known: "1 messages on /goal_pose left out: ...".
+    no_goal: str = ""
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())
     #: What is unusual about the log, in words.
@@ -143,3 +153,25 @@ class Recording:
             raise LogError(
                 f"{self.log}: poses need shapes (n, 2) and (n,), found {self.xy_m.shape}, {self.yaw_rad.shape}"
             )
+        if self.wrench is not None:
+            self._check_wrench(self.wrench.t_ns)
+
+    def _check_wrench(self, t_ns: IntArray) -> None:
+        """Check that there are enough forces to find a bias, and that they were measured while the robot drove."""
+        if len(t_ns) < LEAST_FORCES:
+            raise LogError(f"{self.log}: expected a wrench of at least {LEAST_FORCES} messages, found {len(t_ns)}")
+        if t_ns[0] > self.t_ns[-1] or t_ns[-1] < self.t_ns[0]:
+            raise LogError(
+                f"{self.log}: wrench and poses share no time: expected stamps of one clock, found the wrench "
+                f"{(int(t_ns[0]) - int(self.t_ns[0])) / 1e9:+.0f} s from the poses; correct the stamps"
+            )
+
+    @property
+    def goal_problem(self) -> str:
+        """Why trials cannot be split at goals, and what to do; empty where there are goals."""
+        if len(self.goal_t_ns):
+            return ""
+        remedy = "give one with `goal` x,y, or choose `split` stop or `split` none"
+        if self.no_goal:
+            return f"{self.log}: trials cannot be split at goals, because no goal is left: {self.no_goal}; or {remedy}"
+        return f"{self.log}: no goal is announced, so that trials cannot be split at goals; {remedy}"

@@ -198,8 +198,9 @@ def _refuse_foreign(folder: Path, listed: Iterable[str], info: Mapping[Any, Any]
     """Refuse a bag whose files or messages navirl cannot read."""
     if info.get("storage_identifier") == "sqlite3" or any(".db3" in PurePosixPath(name).suffixes for name in listed):
         found = "a ROS 2 bag in SQLite"
-    elif str(info.get("compression_mode")).lower() == "message":
-        found = "one whose messages are compressed one by one (compression_mode: MESSAGE)"
+    elif str(info.get("compression_mode")).lower() == "message" and info.get("compression_format") != "zstd":
+        packed = brief(info.get("compression_format"))
+        found = f"one whose messages are compressed one by one (compression_mode: MESSAGE) by {packed}, not by zstd"
     else:
         return
     made = CONVERT.format(path=folder, stem=folder.resolve().name)

@@ -220,8 +220,13 @@ def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -
 
 
 def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """Choices that the user may not have intended."""
+    """Choices that the user may not have intended; they are known before the fit starts."""
     lines = []
+    if not any(len(demonstration.people_m) for demonstration in chosen):
+        lines.append(
+            f"none of the {len(chosen)} demonstrations has people, so that the personal space (a_p, sigma_p) cannot be "
+            "learnt from them; extract them again with a people topic, or give places with `person` x,y"
+        )
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(

@@ -1,22 +1,19 @@
 """Answers to a questionnaire, one a line of a CSV file, and how they spread over the levels of its scale."""
 
-import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent, IntArray
+from navirl_cli.documents.sheets import read_sheet
 from navirl_cli.errors import ArtefactError, brief
 
 #: Columns in any order; the modality's may be missing.
 COLUMNS, OPTIONAL = ("participant", "question", "modality", "answer"), "modality"
 #: Default number of levels of a scale.
 LEVELS = 5
-_HEADER = "a header of participant,question,modality,answer"
-_REMEDY = 'save it as "CSV UTF-8"'
 
 
 @dataclass(frozen=True)
@@ -75,7 +72,7 @@ def shares(answers: Iterable[Answer], levels: int = LEVELS) -> list[Shares]:
 
 
 def read_answers(path: Path, levels: int = LEVELS) -> list[Answer]:
-    """Read a CSV file with one answer a line, separated by commas or, as Excel writes it in some languages, semicolons.
+    """Read a CSV file with one answer a line, by :func:`navirl_cli.documents.sheets.read_sheet`.
 
     Args:
         path: A UTF-8 file whose first line names COLUMNS; empty lines are skipped.
@@ -88,74 +85,22 @@ def read_answers(path: Path, levels: int = LEVELS) -> list[Answer]:
         ArtefactError: The file cannot be read or is not as described, an answer is no level, or one person answers a
             question about a modality twice.
     """
-    rows = _rows(path, _text(path))
-    line, header = next(rows, (1, []))
-    _check_header(f"{path}: line {line}", header)
+    needed = [name for name in COLUMNS if name != OPTIONAL]
+    _, rows = read_sheet(path, COLUMNS, needed, "answers")
     answers: list[Answer] = []
     lines: dict[tuple[str, str, str], int] = {}
-    for line, row in rows:
-        where = f"{path}: line {line}"
-        if len(row) != len(header):
-            raise ArtefactError(
-                f"{where}: expected {len(header)} columns as in the header, found {len(row)}; put a text with the "
-                "separator in it in double quotes"
-            )
-        one = _answer(where, dict(zip(header, row, strict=True)), levels)
+    for row in rows:
+        one = _answer(row.where, row.cells, levels)
         asked = one.participant, one.question, one.modality
-        first = lines.setdefault(asked, line)
-        if first != line:
+        first = lines.setdefault(asked, row.number)
+        if first != row.number:
             about = f" about {brief(one.modality)}" if one.modality else ""
             raise ArtefactError(
-                f"{where}: expected one answer of {brief(one.participant)} to {brief(one.question)}{about}, found a "
-                f"second after that of line {first}; remove one"
+                f"{row.where}: expected one answer of {brief(one.participant)} to {brief(one.question)}{about}, found "
+                f"a second after that of line {first}; remove one"
             )
         answers.append(one)
-    if not answers:
-        raise ArtefactError(f"{path}: expected answers below the header, found none; add one line per answer")
     return answers
-
-
-def _text(path: Path) -> str:
-    """The whole file."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ArtefactError(f"{path}: expected a CSV file, cannot be read: {error.strerror}; check the path") from error
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ArtefactError(
-            f"{path}: line {line}: expected UTF-8, found the byte 0x{data[error.start]:02x}; {_REMEDY}"
-        ) from error
-
-
-def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line (of a text over several its last) and cells of every row that is not empty."""
-    header = text.lstrip().split("\n", maxsplit=1)[0]
-    reader = csv.reader(StringIO(text, newline=""), delimiter=";" if ";" in header else ",", strict=True)
-    try:
-        for row in reader:
-            cells = [" ".join(cell.split()) for cell in row]
-            if any(cells):
-                yield reader.line_num, cells
-    except csv.Error as error:
-        raise ArtefactError(f"{path}: line {reader.line_num}: expected CSV, found: {error}; {_REMEDY}") from error
-
-
-def _check_header(where: str, header: list[str]) -> None:
-    """Refuse columns that are missing, unknown or there twice."""
-    if not header:
-        raise ArtefactError(f"{where}: expected {_HEADER}, found nothing; give the file with the answers")
-    for name in COLUMNS:
-        if name not in header and name != OPTIONAL:
-            raise ArtefactError(
-                f"{where}: expected {_HEADER}, found no column {name} but {brief(','.join(header))}; name them so"
-            )
-    for name in header:
-        if name not in COLUMNS or header.count(name) > 1:
-            what = "an unknown" if name not in COLUMNS else "a second"
-            raise ArtefactError(f"{where}: expected {_HEADER}, found {what} column {brief(name)}; remove it")
 
 
 def _answer(where: str, cells: dict[str, str], levels: int) -> Answer:
@@ -168,4 +113,4 @@ def _answer(where: str, cells: dict[str, str], levels: int) -> Answer:
         raise ArtefactError(f"{where}, column answer: {expected}, found nothing; remove the line")
     if not (text.isascii() and text.isdecimal() and len(text) < 10 and 1 <= int(text) <= levels):
         raise ArtefactError(f"{where}, column answer: {expected}, found {brief(text)}; correct the answer")
-    return Answer(cells["participant"], cells["question"], cells.get("modality", ""), int(text))
+    return Answer(cells["participant"], cells["question"], cells["modality"], int(text))

@@ -10,6 +10,7 @@ from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel, gathered
 from navirl_cli.logs.messages.layout import Layout, derive
 from navirl_cli.logs.messages.schema import AnySchema, DecodeError, JsonSchema, Leaf, Schema, value_at
+from navirl_cli.logs.messages.single import without_compression
 
 Columns = dict[str, NDArray[Any]]
 
@@ -70,6 +71,8 @@ class Decoder:
         Returns:
             The columns of the messages that decode.
         """
+        if getattr(self.schema, "encoding", "") != "ros1":
+            batch = without_compression(batch)
         if isinstance(self.schema, JsonSchema):
             any(self.schema.learn(batch.payload(row), self.paths) for row in range(len(batch.starts)))
         leaves, sizes = self.leaves, batch.sizes
@@ -200,7 +203,7 @@ class _ColumnBuilder:
         if leaf.sequence is not None:
             column = empty_column(leaf, len(value))
             for number, one in enumerate(value):
-                column[number] = _checked(one, leaf)
+                column[number] = one if leaf.nested else _checked(one, leaf)
             return column
         return _checked(value, leaf)
 

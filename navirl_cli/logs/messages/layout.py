@@ -9,6 +9,7 @@ Source: OMG CORBA 3.0, chapter 15.3 (CDR transfer syntax); DDSI-RTPS 2.2, chapte
 (ROS 1).
 """
 
+import re
 import struct
 from collections import Counter
 from collections.abc import Iterable
@@ -20,11 +21,10 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc
 
-from navirl_cli.logs.messages.schema import PRIMITIVES, TIMES, Schema
+from navirl_cli.logs.messages.schema import ENCAPSULATIONS, PRIMITIVES, TIMES, Schema
 
-#: Bytes of encapsulation before a CDR message; and by its first two bytes: the byte order, and the two as uint16.
+#: Bytes of encapsulation before a CDR message.
 ENCAPSULATION_SIZE: Final = 4
-_ENCAPSULATIONS: Final = {b"\0\1": ("<", 0x0100), b"\0\0": (">", 0x0000)}
 #: Some writers pad a payload to a multiple of four bytes.
 _MAX_PADDING: Final = 3
 #: Messages with more fields, including those in sequences, are decoded one by one.
@@ -77,6 +77,8 @@ class _Walker:
     #: Sequences that hold wanted fields.
     sequences: frozenset[str]
     order: str
+    #: Fixed arrays of which single numbers are wanted.
+    indexed: frozenset[str]
     #: First byte of the message, from which alignment is counted.
     base: int
     at: int
@@ -143,6 +145,9 @@ class _Walker:
         if count is not None:
             for place in {path, f"{path}[]"} & self.wanted:
                 self.fields[place] = (self.at, (dtype, (count,)))
+            for number in range(count) if path in self.indexed else ():
+                if (place := f"{path}[{number}]") in self.wanted:
+                    self.fields[self.entry(place)] = (self.at + number * size, dtype)
         elif path in self.wanted:
             self.fields[self.entry(path)] = (self.at, dtype)
         self.skip(size * (1 if count is None else count))
@@ -199,14 +204,17 @@ def derive(schema: Schema, payload: bytes, wanted: Iterable[str]) -> Layout | No
     order, base = "<", 0
     checks: list[tuple[int, str, int]] = []
     if schema.encoding == "cdr":
-        if (start := payload[:2]) not in _ENCAPSULATIONS:
+        if (start := payload[:2]) not in ENCAPSULATIONS:
             return None
-        order, value = _ENCAPSULATIONS[start]
+        order = ENCAPSULATIONS[start]
         base = ENCAPSULATION_SIZE
-        checks.append((0, "<u2", value))
+        checks.append((0, "<u2", int.from_bytes(start, "little")))
     paths = frozenset(wanted)
+    if any(path.count("[]") > 1 for path in paths):
+        return None
     sequences = frozenset(path.partition("[]")[0] + "[]" for path in paths if "[]" in path)
-    walker = _Walker(schema, payload, paths, sequences, order, base, base, checks=checks)
+    indexed = frozenset(path.rpartition("[")[0] for path in paths if re.search(r"\[\d+\]$", path))
+    walker = _Walker(schema, payload, paths, sequences, order, indexed, base, base, checks=checks)
     try:
         walker.message(schema.name, "")
     except _UnfitError:

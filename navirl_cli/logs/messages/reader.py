@@ -13,12 +13,17 @@ from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import DecodedBatch
+from navirl_cli.logs.messages.schema import full_name
 from navirl_cli.logs.messages.series import Series, SeriesBuilder
 
 #: Called with the bytes done and the bytes of all files.
 Progress = Callable[[int, int], None]
 #: The name of a file, or a file that is open already, for instance because it had to be decompressed.
 Log = Path | str | RawFile
+#: A topic, all of whose messages should have one type, or a topic and the full name of one of its types.
+TopicKey = str | tuple[str, str]
+#: Fields by topic; the keys are of one kind.
+Wants = Mapping[str, Sequence[str]] | Mapping[tuple[str, str], Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ class Contents:
 class ReadResult:
     """A series for each topic that a file has and that decodes, and what could not be read."""
 
-    series: dict[str, Series]
+    series: dict[TopicKey, Series]
     damage: tuple[Damage, ...]
 
 
@@ -100,17 +105,17 @@ def message_times(path: Log) -> tuple[Contents, dict[int, IntArray]]:
 
 def read(
     paths: Log | Sequence[Log],
-    wants: Mapping[str, Sequence[str]],
+    wants: Wants,
     progress: Progress | None = None,
     threads: int | None = None,
-    latest: Collection[str] = (),
+    latest: Collection[TopicKey] = (),
 ) -> ReadResult:
     """Read topics from one or several files.
 
     Args:
         paths: MCAP files; messages of equal times are returned in this order.
-        wants: By topic: dotted fields such as "header.stamp", "wrench.force.x" or "poses[].position.x", which become
-            columns.
+        wants: By topic, or by topic and type: dotted fields such as "header.stamp", "wrench.force.x" or
+            "poses[].position.x", which become columns.
         progress: Called with the bytes done and the bytes of all files.
         threads: Number of threads that decompress and decode; by default one for each core, four at most.
         latest: Topics of which only the message received last is wanted, such as maps that are sent repeatedly.
@@ -124,7 +129,10 @@ def read(
     """
     files = [paths] if isinstance(paths, Path | str | RawFile) else list(paths)
     sizes = [_size(path) for path in files]
-    builders = {topic: SeriesBuilder(topic, topic in latest) for topic in wants}
+    fields: dict[TopicKey, tuple[str, ...]] = {key: tuple(paths) for key, paths in wants.items()}
+    builders: dict[TopicKey, SeriesBuilder] = {
+        key: SeriesBuilder(key if isinstance(key, str) else key[0], key in latest) for key in fields
+    }
     damage: list[Damage] = []
     begin = 0
     for number, path in enumerate(files):
@@ -133,15 +141,15 @@ def read(
             if progress is not None:
                 progress(done + round(share * size), sum(sizes))
 
-        batches, found = _read_file(path, wants, builders, report, threads or threads_here())
-        for topic, some in batches.items():
-            builders[topic].add(some, begin)
+        batches, found = _read_file(path, fields, builders, report, threads or threads_here())
+        for key, some in batches.items():
+            builders[key].add(some, begin)
         begin += 1 + max(
             (int(one.order.max()) for some in batches.values() for one in some if len(one.order)), default=0
         )
         damage += found
         report(1.0)
-    series = {topic: builder.series() for topic, builder in builders.items() if builder.decoders}
+    series = {key: builder.series() for key, builder in builders.items() if builder.decoders}
     return ReadResult(series, tuple(damage))
 
 
@@ -154,19 +162,19 @@ def _size(path: Log) -> int:
 
 def _read_file(
     path: Log,
-    wants: Mapping[str, Sequence[str]],
-    builders: Mapping[str, SeriesBuilder],
+    wants: Mapping[TopicKey, tuple[str, ...]],
+    builders: Mapping[TopicKey, SeriesBuilder],
     progress: Callable[[float], None],
     threads: int,
-) -> tuple[dict[str, list[DecodedBatch]], list[Damage]]:
+) -> tuple[dict[TopicKey, list[DecodedBatch]], list[Damage]]:
     """The batches of one file by topic, and its damage; without message indexes if those lack messages."""
     for trust_indexes in (True, False):
         with LogFile(path, trust_indexes=trust_indexes) as log:
-            walk = _Walk(wants, builders, {topic: [] for topic in wants})
+            walk = _Walk(wants, builders, {key: [] for key in wants})
             walk.over(log, progress, threads)
             missing = walk.missing(log)
             texts = [*walk.undecodable(log), *missing]
-            texts += [text for topic, batches in walk.batches.items() for text in _undecoded(topic, batches)]
+            texts += [text for batches in walk.batches.values() for text in _undecoded(batches)]
             damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in texts)]
         if not missing:
             break
@@ -177,22 +185,27 @@ def _read_file(
 class _Walk:
     """One walk over a file's wanted messages."""
 
-    wants: Mapping[str, Sequence[str]]
-    builders: Mapping[str, SeriesBuilder]
+    wants: Mapping[TopicKey, tuple[str, ...]]
+    builders: Mapping[TopicKey, SeriesBuilder]
     #: By topic.
-    batches: dict[str, list[DecodedBatch]]
+    batches: dict[TopicKey, list[DecodedBatch]]
     #: Number of messages found, by channel.
     seen: Counter[int] = field(default_factory=Counter)
     #: The reasons why channels cannot be decoded, by channel.
     unusable: dict[int, str] = field(default_factory=dict)
 
+    def key(self, channel: Channel) -> TopicKey:
+        """The wanted topic that a channel belongs to: its name, or its name with the type where types are named."""
+        return channel.topic if channel.topic in self.builders else (channel.topic, full_name(channel.schema_name))
+
     def over(self, log: LogFile, progress: Callable[[float], None], threads: int) -> None:
         """Walk over a file."""
         for decoded, count in log.results(self.wanted, self.decoded, threads):
             self.seen[decoded.channel.id] += count
-            batches = self.batches[decoded.channel.topic]
+            key = self.key(decoded.channel)
+            batches = self.batches[key]
             batches.append(decoded)
-            if self.builders[decoded.channel.topic].latest:
+            if self.builders[key].latest:
                 filled = [one for one in batches if len(one.order)]
                 batches[:] = sorted(filled, key=lambda one: int(one.log_time_ns.max()))[-1:] or batches
             progress(log.position / log.size)
@@ -201,16 +214,17 @@ class _Walk:
 
     def wanted(self, channel: Channel) -> bool:
         """Whether a channel's messages are wanted and can be decoded."""
-        if channel.topic not in self.wants:
+        key = self.key(channel)
+        if key not in self.builders:
             return False
-        error = self.builders[channel.topic].add_channel(channel, tuple(self.wants[channel.topic]))
+        error = self.builders[key].add_channel(channel, self.wants[key])
         if error:
             self.unusable[channel.id] = f"topic {channel.topic}: {error}"
         return not error
 
     def decoded(self, batch: Batch) -> tuple[DecodedBatch, int]:
         """A batch's columns, and its number of messages; in any thread."""
-        builder = self.builders[batch.channel.topic]
+        builder = self.builders[self.key(batch.channel)]
         decoder = builder.decoders[batch.channel]
         newest = decoder.decode(batch.newest()) if builder.latest else None
         decoded = newest if newest is not None and len(newest.order) else decoder.decode(batch)
@@ -223,7 +237,7 @@ class _Walk:
 
     def missing(self, log: LogFile) -> list[str]:
         """The wanted channels of which messages are missing."""
-        wanted = [one for one in log.channels if one.topic in self.wants and one.id not in self.unusable]
+        wanted = [one for one in log.channels if self.key(one) in self.builders and one.id not in self.unusable]
         return _missing(log, wanted, self.seen)
 
 
@@ -288,7 +302,7 @@ def _counted(log: LogFile) -> Mapping[int, int] | None:
     return log.summary.statistics.by_channel if log.summary and log.summary.statistics else None
 
 
-def _undecoded(topic: str, batches: Sequence[DecodedBatch]) -> list[str]:
+def _undecoded(batches: Sequence[DecodedBatch]) -> list[str]:
     """The damage of payloads that do not decode."""
     seen = sum(decoded.count for decoded in batches)
     bad = seen - sum(len(decoded.order) for decoded in batches)
@@ -296,6 +310,7 @@ def _undecoded(topic: str, batches: Sequence[DecodedBatch]) -> list[str]:
         return []
     error = next(decoded.error for decoded in batches if decoded.error)
     name = batches[0].channel.schema_name
+    topic = batches[0].channel.topic
     many = f"all {seen}" if bad == seen else f"{bad} of {seen}"
     return [f"{many} messages of {topic} do not decode as {name} and are lost ({error})"]
 

@@ -2,17 +2,20 @@
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError, normalize_fieldname
 from rosbags.typesys.store import Typestore
+
+from navirl_cli.errors import MOST_NAMES
 
 TIMES: Final = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
 
@@ -38,8 +41,17 @@ _SEPARATOR: Final = "=" * 80 + "\n"
 _PARSER_ERRORS: Final = (TypesysError, SyntaxError, LookupError, ValueError, TypeError, AttributeError, AssertionError)
 #: Most entries of a fixed array of texts or messages, for each of which rosbags generates code; and of numbers.
 _MAX_WRITTEN_OUT, _MAX_ARRAY = 1000, 1 << 28
+#: Most fields of a definition for which rosbags generates code, in a time that grows with their square.
+_MAX_GENERATED: Final = 5000
+#: Most messages within messages within messages.
+_MAX_NESTED: Final = 50
 #: The field that rosbags gives to a message without fields: a byte in CDR, nothing in ROS 1.
 _FILLER: Final = "structure_needs_at_least_one_member"
+
+#: The first two bytes of a CDR message: the byte order.
+ENCAPSULATIONS: Final = {b"\0\1": "<", b"\0\0": ">"}
+#: Those of the second version of CDR, which aligns numbers of 8 bytes to 4.
+_XCDR2: Final = frozenset(bytes([0, second]) for second in range(6, 12))
 
 #: Schema encodings by message encoding; JSON messages need no schema.
 ENCODINGS: Final = {"cdr": ("ros2msg", "ros2idl"), "ros1": ("ros1msg",), "json": None}
@@ -65,6 +77,8 @@ class Leaf:
     count: int | None = None
     #: The sequence that holds the field, "transforms[]"; its column has the entries of all messages in order.
     sequence: str | None = None
+    #: Whether each entry holds a sequence of its own, "detections[].results[].score": an entry of the column is a list.
+    nested: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -74,44 +88,70 @@ class Leaf:
 
 @dataclass(frozen=True, eq=False)
 class Schema:
-    """A message type with every type that it contains, in a store of its own."""
+    """A message type with every type that it contains."""
 
     #: Full name, "geometry_msgs/msg/WrenchStamped".
     name: str
-    store: Typestore
+    #: Constants and fields by the name of the type, of this type and of all that the definition contains.
+    types: Typesdict
     #: How payloads are encoded, "cdr" or "ros1".
     encoding: str = "cdr"
 
+    @cached_property
+    def store(self) -> Typestore:
+        """The types with the code that decodes them, which is generated when the first message needs it.
+
+        Raises:
+            DecodeError: rosbags cannot generate code for the types.
+        """
+        count = sum(len(fields) for _, fields in self.types.values())
+        if count > _MAX_GENERATED:
+            raise DecodeError(f"its definition has {count} fields; at most {_MAX_GENERATED} are decoded one by one")
+        store = get_typestore(Stores.EMPTY)
+        try:
+            store.register({name: one for name, one in self.types.items() if name not in store.fielddefs})
+            store.get_msgdef(self.name)
+        except (*_PARSER_ERRORS, RecursionError) as error:
+            raise DecodeError(f"no code for its definition ({_first_line(error)})") from error
+        return store
+
     def fields(self, typename: str) -> list[tuple[str, FieldDesc]]:
         """Names and types of the fields of a contained type, in the order of the bytes."""
-        fields = self.store.fielddefs[typename][1]
+        fields = self.types[typename][1]
         return fields if self.encoding == "cdr" else [one for one in fields if one[0] != _FILLER]
 
     def leaf(self, path: str) -> Leaf:
-        """The leaf of a dotted field; "poses[].position.x" is a field of every entry of a sequence.
+        """The leaf of a dotted field.
+
+        "poses[].position.x" is a field of every entry of a sequence, "objects[].position[0]" a number of a fixed array,
+        and "detections[].results[].score" a list for every entry.
 
         Raises:
             SchemaError: The type has no such field, or the field cannot become a column.
         """
         desc: FieldDesc = (Nodetype.NAME, self.name)
-        sequence = None
+        sequences: list[str] = []
         for number, step in enumerate(steps := path.split(".")):
             if desc[0] != Nodetype.NAME:
                 raise SchemaError(f"{step!r} in {path!r} is below a field that is not a single message")
-            name = step.removesuffix("[]")
+            name, bracket, inside = step.partition("[")
             fields = dict(self.fields(desc[1]))
             if name not in fields:
-                known = ", ".join(fields).replace(_FILLER, "none")
-                raise SchemaError(f"{desc[1]} has no field {name!r} of {path!r}; its fields are {known}")
+                raise SchemaError(f"{desc[1]} has no field {name!r} of {path!r}; its fields are {_listed(fields)}")
             desc = fields[name]
-            if name != step:
-                if desc[0] not in {Nodetype.ARRAY, Nodetype.SEQUENCE} or sequence is not None:
-                    raise SchemaError(f"{step!r} in {path!r} is not a sequence, or is inside another one")
-                desc, sequence = desc[1][0], ".".join(steps[: number + 1])
+            if bracket and inside != "]":
+                desc = _one_of(desc, step, path)
+            elif bracket:
+                if desc[0] not in {Nodetype.ARRAY, Nodetype.SEQUENCE} or len(sequences) > 1:
+                    raise SchemaError(f"{step!r} in {path!r} is not a sequence, or is inside two others")
+                desc = desc[1][0]
+                sequences.append(".".join(steps[: number + 1]))
         leaf = _leaf(path, desc)
-        if sequence is not None and leaf.count is not None:
+        if sequences and leaf.count is not None:
             raise SchemaError(f"{path!r} is an array in a sequence")
-        return Leaf(leaf.value_type, leaf.dtype, leaf.count, sequence)
+        if len(sequences) > 1:
+            return Leaf(leaf.value_type, "O", None, sequences[0], nested=True)
+        return Leaf(leaf.value_type, leaf.dtype, leaf.count, sequences[0] if sequences else None)
 
     def deserialize(self, payload: bytes) -> Any:
         """The message object of a payload.
@@ -119,7 +159,11 @@ class Schema:
         Raises:
             DecodeError: It is not a message of this type.
         """
-        decode = self.store.deserialize_ros1 if self.encoding == "ros1" else self.store.deserialize_cdr
+        if self.encoding == "cdr" and (found := payload[:2]) not in ENCAPSULATIONS:
+            kind = "XCDR2, " if found in _XCDR2 else ""
+            raise DecodeError(f"expected plain CDR, which begins with 0x0000 or 0x0001, found {kind}0x{found.hex()}")
+        store = self.store
+        decode = store.deserialize_ros1 if self.encoding == "ros1" else store.deserialize_cdr
         try:
             return decode(payload, self.name)
         except SerdeError as error:
@@ -135,12 +179,14 @@ class JsonSchema:
 
     def leaf(self, path: str) -> Leaf:
         """The leaf of a field; a number until a message has the field."""
-        sequence = path.rpartition("[]")[0]
-        return self._leaves.get(path, Leaf("number", "<f8", None, f"{sequence}[]" if sequence else None))
+        sequence, bracket, rest = path.partition("[]")
+        if "[]" in rest:
+            return Leaf("any", "O", None, f"{sequence}[]", nested=True)
+        return self._leaves.get(path, Leaf("number", "<f8", None, f"{sequence}[]" if bracket else None))
 
     def learn(self, payload: bytes, paths: Iterable[str]) -> bool:
         """Learn the types of fields from a message; return whether all are known now."""
-        unknown = [path for path in paths if path not in self._leaves]
+        unknown = [path for path in paths if path not in self._leaves and path.count("[]") < 2]
         if unknown:
             try:
                 message = self.deserialize(payload)
@@ -178,7 +224,8 @@ def value_at(message: Any, path: str) -> Any:
     """
     head, bracket, tail = path.partition("[]")
     value = message
-    for part in head.split("."):
+    for step in head.split("."):
+        part, indexed, place = step.partition("[")
         name = normalize_fieldname(part)
         if isinstance(value, dict) and part in value:
             value = value[part]
@@ -186,11 +233,20 @@ def value_at(message: Any, path: str) -> Any:
             value = getattr(value, name)
         else:
             raise DecodeError(f"no field {part!r} of {path!r}")
+        if indexed:
+            value = _at(value, int(place.removesuffix("]")), path)
     if not bracket:
         return value
     if isinstance(value, str | dict) or not hasattr(value, "__len__"):
         raise DecodeError(f"{head!r} is not a sequence")
     return [value_at(one, tail[1:]) for one in value] if tail else list(value)
+
+
+def _at(value: Any, place: int, path: str) -> Any:
+    """An entry of a fixed array."""
+    if not isinstance(value, list | np.ndarray) or place >= len(value):
+        raise DecodeError(f"no entry {place} for {path!r}")
+    return value[place]
 
 
 def _json_leaf(message: Any, path: str, sequence: str | None) -> Leaf | None:
@@ -234,17 +290,32 @@ def parse_definition(name: str, encoding: str, text: str, message_encoding: str 
 
 @lru_cache(maxsize=256)
 def _parsed(full: str, encoding: str, text: str, message_encoding: str) -> Schema:
-    # a store with times only, which are primitives in ROS 1
-    store = get_typestore(Stores.EMPTY)
-    schema = Schema(full, store, message_encoding)
     try:
-        store.register(_types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, full))
+        found = _types_from_idl(text) if encoding == "ros2idl" else get_types_from_msg(text, full)
+        schema = Schema(full, _with_times(found), message_encoding)
         _check(schema)
-        store.get_msgdef(full)
     except (*_PARSER_ERRORS, RecursionError) as error:
-        first = (str(error).splitlines() or [""])[0][:120]
-        raise SchemaError(f"its definition does not parse ({type(error).__name__}: {first})") from error
+        raise SchemaError(f"its definition does not parse ({_first_line(error)})") from error
     return schema
+
+
+def _first_line(error: BaseException) -> str:
+    """The type of an error and the beginning of its first line."""
+    return f"{type(error).__name__}: {(str(error).splitlines() or [''])[0][:120]}"
+
+
+def _with_times(found: Typesdict) -> Typesdict:
+    """Parsed types, each with a field, and times, which are primitives in ROS 1.
+
+    Raises:
+        TypesysError: The text defines a time in another way.
+    """
+    times = get_typestore(Stores.EMPTY).fielddefs
+    for name in times.keys() & found.keys():
+        if [(field.lower(), desc) for field, desc in found[name][1]] != times[name][1]:
+            raise TypesysError(f"Type {name!r} is already present with different definition.")
+    filler: list[tuple[str, FieldDesc]] = [(_FILLER, (Nodetype.BASE, ("uint8", 0)))]
+    return {**{name: (constants, fields or filler) for name, (constants, fields) in found.items()}, **times}
 
 
 def full_name(name: str) -> str:
@@ -265,11 +336,15 @@ def _types_from_idl(text: str) -> Typesdict:
 
 def _check(schema: Schema) -> None:
     """Check that every type is defined, and that nothing keeps rosbags busy for ever."""
-    known = schema.store.fielddefs
+    known = schema.types
     fields = [(name, desc, _entry(desc)) for owner in known for name, desc in schema.fields(owner)]
     used = {entry[1] for _, _, entry in fields if entry[0] == Nodetype.NAME} | {schema.name}
     if missing := used - known.keys():
         raise TypesysError(f"no definition of {', '.join(sorted(map(str, missing)))}")
+    _check_nesting(schema)
+    for owner, (_, listed) in known.items():
+        # rosbags makes attributes of the fields
+        _check_names(owner, [name for name, _ in listed])
     for name, desc, entry in fields:
         number = entry[0] == Nodetype.BASE and entry[1][0] != "string"
         if number and entry[1][0] not in PRIMITIVES:
@@ -279,6 +354,48 @@ def _check(schema: Schema) -> None:
             raise TypesysError(f"{name} is an array of {size} entries")
         if desc[0] == Nodetype.SEQUENCE and entry[0] == Nodetype.NAME and not schema.fields(entry[1]):
             raise TypesysError(f"{name} is a sequence of messages without fields")
+
+
+def _check_nesting(schema: Schema) -> None:
+    """Check that no type contains itself, nor messages so deep that rosbags cannot follow."""
+    depths: dict[str, int] = {}
+
+    def depth(typename: str, above: tuple[str, ...]) -> int:
+        if typename in above:
+            raise TypesysError(f"{typename} contains itself")
+        if typename not in depths:
+            entries = [_entry(desc) for _, desc in schema.types[typename][1]]
+            inner = {str(entry[1]) for entry in entries if entry[0] == Nodetype.NAME}
+            depths[typename] = 1 + max((depth(one, (*above, typename)) for one in sorted(inner)), default=0)
+        if len(above) + depths[typename] > _MAX_NESTED:
+            raise TypesysError(f"{schema.name} holds messages in messages more than {_MAX_NESTED} deep")
+        return depths[typename]
+
+    depth(schema.name, ())
+
+
+def _check_names(owner: str, names: list[str]) -> None:
+    """Check that the fields of a type have different names, in Python too."""
+    taken: dict[str, str] = {}
+    for name in names:
+        other = taken.setdefault(normalize_fieldname(name), name)
+        if other is not name:
+            raise TypesysError(f"{owner} has conflicting Python names: {other!r} and {name!r}")
+
+
+def _listed(fields: Mapping[str, FieldDesc]) -> str:
+    """The names of a type's fields, at most a line of them."""
+    names = [name for name in fields if name != _FILLER]
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return (", ".join(names[:MOST_NAMES]) or "none") + more
+
+
+def _one_of(desc: FieldDesc, step: str, path: str) -> FieldDesc:
+    """The type of one entry of a fixed array, "position[0]"."""
+    place = step.partition("[")[2].removesuffix("]")
+    if desc[0] != Nodetype.ARRAY or not place.isdecimal() or int(place) >= desc[1][1]:
+        raise SchemaError(f"{step!r} in {path!r} is not an entry of a fixed array")
+    return desc[1][0]
 
 
 def _entry(desc: FieldDesc) -> FieldDesc:

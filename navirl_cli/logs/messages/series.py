@@ -35,6 +35,11 @@ class Series:
         return len(self.log_time_ns)
 
 
+def lacks_definition(channel: Channel) -> bool:
+    """Whether a recorder has left out a channel's definition: there is no text, and no encoding is named."""
+    return not channel.schema_text.strip() and not channel.schema_encoding and channel.message_encoding != "json"
+
+
 @dataclass(eq=False)
 class SeriesBuilder:
     """Joins the batches of one topic to a series."""
@@ -55,6 +60,9 @@ class SeriesBuilder:
         if self.decoders and channel.schema_name != self.schema_name:
             found = f"found {channel.schema_name}, which is ignored"
             return f"expected {self.schema_name}, as in its other channels, {found}"
+        if lacks_definition(channel):
+            name = channel.schema_name or "a schema without a name"
+            return f"{name} has no definition in the file, so that its messages cannot be decoded; record it"
         try:
             schema = parse_definition(
                 channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding

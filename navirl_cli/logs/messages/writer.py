@@ -200,7 +200,7 @@ class LogWriter:
 
 def _fill(topic: str, template: Any, n: int, columns: Mapping[str, ArrayLike]) -> NDArray[np.void]:
     """The payloads of `LogWriter.columns`, as a structured array of shape (n,)."""
-    schema = Schema(template.__msgtype__, _builtin())
+    schema = Schema(template.__msgtype__, _builtin().fielddefs)
     payload = bytes(_builtin().serialize_cdr(template, schema.name, little_endian=True))
     try:
         leaves = {path: schema.leaf(path) for path in columns}

@@ -1,7 +1,9 @@
 """The message types that navirl understands, by the role that they serve.
 
 A new message type is one more entry in the tuple of its role: which field of the message stands for which field of the
-role, and how the topics that serve are recognised. No other file knows the type. The fields of each role:
+role, and how the topics that serve are recognised. No other file knows the type. Where releases define a type in
+different ways, each has an entry, and the first whose fields the definition in the log has counts. The fields of each
+role:
 
 - every role: ``stamp``, the time of the measurement, and ``frame``, each where the type has one;
 - wrench: ``fx``, ``fy``, ``fz``, the force in N;
@@ -9,8 +11,10 @@ role, and how the topics that serve are recognised. No other file knows the type
   robot's own frame, and ``vx``, ``vy``, the velocity forward and to the left in m/s;
 - map: ``resolution``, ``width``, ``height``, the origin ``px``, ``py``, ``qz``, ``qw``, and ``data``, the cells;
 - people: ``px``, ``py``, ``pz`` in m, one person for each entry; where the type has them ``name`` and ``space``, which
-  together identify people;
-- goal: ``px``, ``py``, ``pz`` in m; of a sequence the last entry is the goal;
+  together identify people; where entries may be other things, ``label``, their class, and ``score`` where an
+  entry has several classes;
+- goal: ``px``, ``py``, ``pz`` in m; of a sequence the last entry is the goal. Or of an action ``accepted``, a time that
+  identifies a goal, and its ``status``; or ``goal``, its number, and ``left``, the distance to it in m;
 - joystick: any other field is a command that is 0 at rest; a sequence ``axes`` may rest elsewhere.
 """
 
@@ -80,6 +84,8 @@ class MessageType:
     joined: bool = False
     #: By field of the role, which of its values count: entries with other values are left out.
     counted: Mapping[str, Callable[[NDArray[Any]], BoolArray]] = field(default_factory=dict)
+    #: Which classes are people, where entries have a class: a number, or texts in lower case.
+    people_classes: frozenset[int | str] = frozenset()
 
     def of_entries(self, field_name: str) -> bool:
         """Whether a field belongs to the sequence's entries, not to the message."""
@@ -149,6 +155,7 @@ MAPS: Final = (
     ),
 )
 
+_NAVIGATION: Final = _named(needed=r"navigate_(to_pose|through_poses)/_action/", preferred="to_pose")
 GOALS: Final = (
     replace(
         _POSE_STAMPED,
@@ -163,21 +170,152 @@ GOALS: Final = (
         # a piece of a plan ends where the controller looks no farther
         fitness=_named(needed="plan", refused=r"local|transformed|pruned", preferred=r"/plan$"),
     ),
+    # of a navigation action only is known when goals are accepted and reached, not where they are
+    MessageType(
+        "action_msgs/msg/GoalStatusArray",
+        {"accepted": "status_list[].goal_info.stamp", "status": "status_list[].status"},
+        "status_list[]",
+        fitness=_NAVIGATION,
+    ),
+    *(
+        MessageType(
+            f"nav2_msgs/action/{name}_FeedbackMessage",
+            {"goal": "goal_id.uuid", "left": "feedback.distance_remaining"},
+            fitness=_NAVIGATION,
+        )
+        for name in ("NavigateToPose", "NavigateThroughPoses")
+    ),
 )
 
-#: hunav_msgs/Agent: the robot is among its agents.
+#: Names of people among the classes of a detector, in lower case.
+_PEOPLE_CLASSES: Final[frozenset[int | str]] = frozenset({"person", "people", "human", "pedestrian"})
+
+
+def _detected(
+    name: str,
+    sequence: str,
+    position: str,
+    /,
+    *,
+    people: frozenset[int | str] = _PEOPLE_CLASSES,
+    fitness: Fitness = _any_name,
+    **others: str,
+) -> MessageType:
+    """A message that lists things of several classes."""
+    return replace(_listed(name, sequence, position, **others), people_classes=people, fitness=fitness)
+
+
+def _from_zed(package: str) -> MessageType:
+    """Objects and bodies from a ZED camera, whose bodies are labelled "Body_7"."""
+    sequence, position = "objects[]", "objects[].position"
+    fields = _STAMP | {f"p{axis}": f"{position}[{place}]" for place, axis in enumerate("xyz")}
+    fields |= {"name": f"{sequence}.label_id", "label": f"{sequence}.label"}
+    return MessageType(f"{package}/msg/ObjectsStamped", fields, sequence, people_classes=_PEOPLE_CLASSES | {"body"})
+
+
+def _from_autoware(package: str, name: str) -> MessageType:
+    """Objects of Autoware, whose pedestrians have label 7."""
+    return _detected(
+        f"{package}/msg/{name}",
+        "objects[]",
+        "kinematics.pose_with_covariance.pose.position",
+        people=frozenset({7}),
+        label="classification[].label",
+        score="classification[].probability",
+    )
+
+
+#: derived_object_msgs/Object: a pedestrian.
+_PEDESTRIAN: Final[frozenset[int | str]] = frozenset({4})
+#: Detectors whose entries have classes.
+_DETECTIONS: Final = (
+    _detected(
+        "vision_msgs/msg/Detection3DArray",
+        "detections[]",
+        "bbox.center.position",
+        name="id",
+        label="results[].hypothesis.class_id",
+        score="results[].hypothesis.score",
+    ),
+    # ROS 1, and ROS 2 before Galactic
+    _detected(
+        "vision_msgs/msg/Detection3DArray",
+        "detections[]",
+        "bbox.center.position",
+        label="results[].id",
+        score="results[].score",
+    ),
+    _detected(
+        "derived_object_msgs/msg/ObjectArray",
+        "objects[]",
+        "pose.position",
+        people=_PEDESTRIAN,
+        name="id",
+        label="classification",
+    ),
+    _detected(
+        "derived_object_msgs/msg/ObjectWithCovarianceArray",
+        "objects[]",
+        "pose.pose.position",
+        people=_PEDESTRIAN,
+        name="id",
+        label="classification",
+    ),
+    _from_zed("zed_msgs"),
+    _from_zed("zed_interfaces"),
+    # the same type without places in space is published too
+    _detected(
+        "yolo_msgs/msg/DetectionArray",
+        "detections[]",
+        "bbox3d.center.position",
+        fitness=_named(needed="3d"),
+        name="id",
+        frame="bbox3d.frame_id",
+        label="class_name",
+    ),
+    *(
+        _from_autoware(package, name)
+        for package in ("autoware_perception_msgs", "autoware_auto_perception_msgs")
+        for name in ("TrackedObjects", "DetectedObjects")
+    ),
+)
+
+#: hunav_msgs/Agent and pedsim_msgs/AgentState: the robot is among the agents.
 _ROBOT_AGENT: Final = 2
 #: visualization_msgs/Marker: cubes, spheres, cylinders and meshes are bodies; lines, arrows and texts are not.
 _BODIES: Final = (1, 2, 3, 10)
 _ADDED: Final = 0
+_NO_ROBOT: Final[Mapping[str, Callable[[NDArray[Any]], BoolArray]]] = {
+    "type": lambda types: np.asarray(types != _ROBOT_AGENT)
+}
 #: Types that list people first, then those that may be about anything.
 PEOPLE: Final = (
     _listed("people_msgs/msg/People", "people[]", "position", name="name"),
     _listed("spencer_tracking_msgs/msg/TrackedPersons", "tracks[]", "pose.pose.position", name="track_id"),
     replace(
         _listed("hunav_msgs/msg/Agents", "agents[]", "position.position", name="id", type="type"),
-        counted={"type": lambda types: np.asarray(types != _ROBOT_AGENT)},
+        counted=_NO_ROBOT,
     ),
+    _listed("leg_detector_msgs/msg/PersonArray", "people[]", "pose.position", name="id"),
+    _listed("leg_tracker/msg/PersonArray", "people[]", "pose.position", name="id"),
+    _listed("pedsim_msgs/msg/TrackedPersons", "tracks[]", "pose.pose.position", name="track_id"),
+    *(
+        replace(
+            _listed("pedsim_msgs/msg/AgentStates", "agent_states[]", place, name="id", type="type"), counted=_NO_ROBOT
+        )
+        for place in ("pose.position", "position")
+    ),
+    # the array's own header often names no frame
+    _listed(
+        "people_msgs/msg/PositionMeasurementArray",
+        "people[]",
+        "pos",
+        name="object_id",
+        stamp="header.stamp",
+        frame="header.frame_id",
+    ),
+    _listed("spencer_tracking_msgs/msg/DetectedPersons", "detections[]", "pose.pose.position", name="detection_id"),
+    *_DETECTIONS,
     replace(
         _listed("geometry_msgs/msg/PoseArray", "poses[]", "position"),
         fitness=_named(refused=_LIST_NAMES, preferred=_PEOPLE_NAMES),

@@ -1,15 +1,21 @@
-"""People and goals, from messages of many types."""
+"""People, from messages of many types."""
 
+from collections import Counter
 from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.errors import brief
 from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Track
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
+
+#: Most classes that a finding lists.
+_MOST_LABELS: Final = 5
 
 
 def people_of(topics: Sequence[Columns], context: Context) -> tuple[IntArray, tuple[Track, ...], Findings]:
@@ -29,26 +35,15 @@ def people_of(topics: Sequence[Columns], context: Context) -> tuple[IntArray, tu
     for columns in topics:
         t_ns, owner = columns.t_ns, columns.owner
         times.append(t_ns)
-        xy, kept, lost = _placed(columns, context, t_ns[owner], _counted(columns))
-        findings += lost
+        counted, others = _counted(columns)
+        xy, kept, lost = placed(columns, context, t_ns[owner], counted)
+        findings += (*others, *lost)
         names = _names(columns, columns.topic if len(topics) > 1 else "1")[kept]
         tracks += _tracks(names, t_ns[owner][kept], xy[kept])
     return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *times])), tuple(tracks), tuple(findings)
 
 
-def goals_of(columns: Columns | None, context: Context) -> tuple[IntArray, FloatArray, Findings]:
-    """(g,) ns and (g, 2) m of the goals announced, and what was found out; a plan's goal is its end."""
-    if columns is None or len(columns) == 0:
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 2)), ()
-    if columns.counts is not None:
-        columns = columns.last_entries()
-    t_ns = columns.t_ns
-    xy, good, lost = _placed(columns, context, t_ns, np.ones(len(t_ns), dtype=np.bool_))
-    order = np.argsort(t_ns[good], kind="stable")
-    return t_ns[good][order], xy[good][order], lost
-
-
-def _placed(
+def placed(
     columns: Columns, context: Context, t_ns: IntArray, wanted: BoolArray
 ) -> tuple[FloatArray, BoolArray, Findings]:
     """(total, 2) m of the wanted entries in the fixed frame, (total,) which can be placed, and a loss of the others."""
@@ -62,12 +57,43 @@ def _placed(
     return xy, good, (Finding(kind, columns.topic, int((wanted & ~good).sum()), detail=problem),)
 
 
-def _counted(columns: Columns) -> BoolArray:
-    """(total,) which entries are people, as the message type says."""
+def _counted(columns: Columns) -> tuple[BoolArray, Findings]:
+    """(total,) which entries are people, as the message type and their class say; and the classes that are not."""
     counted: BoolArray = np.ones(len(columns["px"]), dtype=np.bool_)
     for name, counts in columns.message_type.counted.items():
         counted &= counts(columns[name])
-    return counted
+    if "label" not in columns or not counted.any():
+        return counted, ()
+    labels = _labels(columns)
+    if all(label == "" for label in labels[counted].tolist()):
+        return counted, (Finding(Kind.NO_LABELS, columns.topic, int(counted.sum())),)
+    people = columns.message_type.people_classes
+    others = counted & ~np.array([_class(label) in people for label in labels.tolist()], dtype=np.bool_)
+    if not others.any():
+        return counted, ()
+    found = Counter(str(label) or "no class" for label in labels[others].tolist()).most_common()
+    listed = ", ".join(f"{brief(label)} ({count})" for label, count in found[:_MOST_LABELS])
+    more = f" and {len(found) - _MOST_LABELS} other classes" if len(found) > _MOST_LABELS else ""
+    return counted & ~others, (Finding(Kind.NOT_PEOPLE, columns.topic, int(others.sum()), detail=listed + more),)
+
+
+def _labels(columns: Columns) -> NDArray[np.object_]:
+    """(total,) class of each entry; of several the one with the highest score; "" without one."""
+    labels = columns["label"]
+    best: NDArray[np.object_] = np.empty(len(labels), dtype=object)
+    if "score" not in columns or not columns.message_type.fields["score"].count("[]") > 1:
+        best[:] = labels.tolist()
+        return best
+    for place, (several, scores) in enumerate(zip(labels, columns["score"], strict=True)):
+        best[place] = several[int(np.argmax(scores))] if len(several) else ""
+    return best
+
+
+def _class(label: Any) -> int | str:
+    """A label as message types name it: a number, or the first word of a text in lower case ("Body_7")."""
+    if isinstance(label, str):
+        return label.strip().partition("_")[0].lower()
+    return int(label)
 
 
 def _names(columns: Columns, alone: str) -> NDArray[np.object_]:

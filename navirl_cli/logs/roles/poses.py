@@ -27,6 +27,13 @@ JUMP_M: Final = 0.25
 #: No robot among people drives faster, m/s.
 _FASTEST_M_S: Final = 3.0
 
+#: Two tracks lie farther apart than this, m. At least so many jumps, such a share of the steps, lead from one to the
+#: other, and such a share of these lead back again.
+_APART_M: Final = 0.1
+_MIN_JUMPS: Final = 10
+_JUMPING: Final = 0.05
+_RETURNING: Final = 0.8
+
 _POSITION: Final = ("px", "py", "pz")
 _ROTATION: Final = ("qx", "qy", "qz", "qw")
 
@@ -55,11 +62,18 @@ def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings
 
     Raises:
         FrameError: tf does not connect the frames, or covers none of the poses' times.
-        LogError: No pose is plausible.
+        LogError: No pose is plausible, or there are those of two robots.
     """
     if columns is None:
         return _from_tf(context)
     columns, frame, others = in_one_frame(columns)
+    if apart := _two_tracks(columns.stacked(*_POSITION)[:, :2]):
+        count, apart_m = apart
+        raise LogError(
+            f"{context.log}: topic {columns.topic}: poses jump to and fro between two tracks {apart_m:.2f} m apart "
+            f"({count} times); two nodes seem to publish there; record one of them only, or name another topic with "
+            "`topic` odometry=/name"
+        )
     rotations = are_rotations(columns.stacked(*_ROTATION))
     columns, implausible = plausible(columns, PLACES, *_POSITION, rotations=rotations)
     if len(columns) == 0:
@@ -142,6 +156,20 @@ def _in_gaps(frame: str, t_ns: IntArray, context: Context) -> tuple[BoolArray, F
     if not inside.any():
         return inside, ()
     return inside, (Finding(Kind.POSES_IN_GAPS, frame, int(inside.sum()), GAP_NS / NS_PER_S),)
+
+
+def _two_tracks(xy_m: FloatArray) -> tuple[int, float] | None:
+    """How often and how far positions (n, 2) m jump to and fro between two tracks; None where they do not."""
+    moved = np.diff(xy_m[np.isfinite(xy_m).all(axis=1)], axis=0)
+    size = np.hypot(*moved.T)
+    jumps = np.flatnonzero(size > _APART_M)
+    if len(jumps) < max(_MIN_JUMPS, _JUMPING * len(moved)):
+        return None
+    there, back = moved[jumps[:-1]], moved[jumps[1:]]
+    returns = np.hypot(*(there + back).T) < np.maximum(size[jumps[:-1]], size[jumps[1:]]) / 2
+    # of a jump there and the next one back, the difference holds the distance twice and the motion not at all
+    apart_m = float(np.median(np.hypot(*(there - back)[returns].T)) / 2) if returns.any() else 0.0
+    return (len(jumps), apart_m) if returns.mean() > _RETURNING else None
 
 
 def _corrections(t_ns: IntArray, moved_m: FloatArray) -> tuple[Jump, ...]:

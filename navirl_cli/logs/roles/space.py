@@ -12,8 +12,9 @@ from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.recording import Occupancy, Track, Wrench
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context
+from navirl_cli.logs.roles.goals import goals_of
 from navirl_cli.logs.roles.maps import map_in, occupancy_of
-from navirl_cli.logs.roles.people import goals_of, people_of
+from navirl_cli.logs.roles.people import people_of
 from navirl_cli.logs.roles.poses import Poses, poses_of
 from navirl_cli.logs.roles.times import Tables
 from navirl_cli.logs.roles.wrench import wrench_of
@@ -44,7 +45,12 @@ class Placed:
 
 
 def in_one_frame(
-    log: str, tables: Tables, frame: str | None, wrench_frame: str | None, occupancy: Occupancy | None
+    log: str,
+    tables: Tables,
+    frame: str | None,
+    wrench_frame: str | None,
+    occupancy: Occupancy | None,
+    force_scale: float = 1.0,
 ) -> Placed:
     """Bring poses, forces, people, goals and the map into the map's or the chosen frame.
 
@@ -54,6 +60,7 @@ def in_one_frame(
         frame: The frame that everything is brought into, in place of the map's.
         wrench_frame: The frame that the wrench is given in, in place of its header's.
         occupancy: A map in place of the log's, in the fixed frame.
+        force_scale: N for the unit of the wrench's forces.
     """
     tree = TransformTree(
         [link for one in tables.get("tf_static", ()) for link in links_of(_tf_columns(one), one.owner_counts)],
@@ -67,9 +74,9 @@ def in_one_frame(
     poses = attempt(lambda: poses_of(_first(tables, "odometry"), context))
     forces = _first(tables, "wrench")
     base = poses[0].base if poses else context.base_frame("")[0]
-    wrench = attempt(lambda: wrench_of(forces, context, base, wrench_frame)) if forces else None
+    wrench = attempt(lambda: wrench_of(forces, context, base, wrench_frame, force_scale)) if forces else None
     people_t_ns, people, lost_people = people_of(tables.get("people", ()), context)
-    goal_t_ns, goal_m, lost_goals = goals_of(_first(tables, "goal"), context)
+    goal_t_ns, goal_m, lost_goals = goals_of(_first(tables, "goal"), context, poses[0] if poses else None)
     placed_map = attempt(lambda: occupancy_of(map_and_frame, context)) if map_and_frame else None
     return Placed(
         context=context,

@@ -36,7 +36,7 @@ def read_tables(
     Raises:
         LogError: A file is no MCAP file.
     """
-    maps = {topic.name for topic in chosen["map"].topics} if "map" in chosen else set()
+    maps = {(topic.name, topic.type_name) for topic in chosen["map"].topics} if "map" in chosen else set()
     result = read(files, _wanted(chosen), progress, latest=maps)
     tables = {role: _columns(choice, result) for role, choice in chosen.items()}
     refusals = [
@@ -47,27 +47,32 @@ def read_tables(
     return TablesRead(tables, result.damage, tuple(refusals))
 
 
-def _wanted(chosen: Mapping[str, Choice]) -> dict[str, Sequence[str]]:
-    """The fields to read by topic; a topic that serves several roles is read once."""
-    wanted: dict[str, dict[str, None]] = {}
+def _wanted(chosen: Mapping[str, Choice]) -> dict[tuple[str, str], Sequence[str]]:
+    """The fields to read by topic and type; a topic that serves several roles is read once."""
+    wanted: dict[tuple[str, str], dict[str, None]] = {}
     for choice in chosen.values():
         for topic in choice.topics:
-            wanted.setdefault(topic.name, {}).update(dict.fromkeys(choice.role.message_type(topic).fields.values()))
+            wanted.setdefault((topic.name, topic.type_name), {}).update(
+                dict.fromkeys(choice.role.message_type(topic).fields.values())
+            )
     return {topic: tuple(fields) for topic, fields in wanted.items()}
 
 
 def _columns(choice: Choice, result: ReadResult) -> list[Columns]:
     """The columns of a role's topics that hold messages."""
     return [
-        Columns.of(result.series[topic.name], choice.role.message_type(topic))
+        Columns.of(series, choice.role.message_type(topic))
         for topic in choice.topics
-        if topic.name in result.series and len(result.series[topic.name])
+        if (series := result.series.get((topic.name, topic.type_name))) is not None and len(series)
     ]
 
 
 def _unread(log: str, choice: Choice, result: ReadResult) -> LogError:
     """Why no message of a role could be read."""
     names = ", ".join(topic.name for topic in choice.topics)
-    reasons = [str(one) for one in result.damage if any(topic.name in one.reason for topic in choice.topics)]
-    why = f": {'; '.join(reasons)}" if reasons else ""
+    prefixes = [f"topic {topic.name}: " for topic in choice.topics]
+    reasons = [one.reason for one in result.damage if any(topic.name in one.reason for topic in choice.topics)]
+    for prefix in prefixes:
+        reasons = [reason.removeprefix(prefix) for reason in reasons]
+    why = f": {'; '.join(dict.fromkeys(reasons))}" if reasons else ""
     return LogError(f"{log}: no message on the {choice.role.name} topic {names} could be read{why}")

@@ -64,29 +64,25 @@ def on_one_clock(log: str, tables: Tables, source: TimeSource) -> Timed:
     reference = _reference(by_role)
     if reference is None:
         raise LogError(
-            f"{log}: expected odometry, tf or a wrench, whose stamps are the recording's clock, found none; "
+            f"{log}: expected odometry, a wrench or tf, whose stamps are the recording's clock, found none of them; "
             "name the odometry with `topic` odometry=/name"
         )
-    roles = [role for role, some in by_role.items() for _ in some]
-    read = [track for some in by_role.values() for track in some]
+    read = [track for several in by_role.values() for some in several for track in some]
     tracks, wrong = repaired(read, reference)
-    reference = tracks[read.index(reference)]
-    odometry = next((one for one, role in zip(tracks, roles, strict=True) if role == "odometry"), None)
+    mended = dict(zip(read, tracks, strict=True))
+    reference = mended[reference]
+    odometry = next((mended[some[0]] for some in by_role.get("odometry", ())), None)
     steps, pauses = steps_of(tracks, _path(tables, odometry))
-    without = [_without_steps(track, steps) for track in tracks]
-    received = _received(without)
+    without = {track: _without_steps(track, steps) for track in tracks}
+    received = _received(without.values())
     start_ns = min(int(times[0]) for times in received.values())
-    clock = Clock(_stamped(without[tracks.index(reference)])[0], source)
+    clock = Clock(_stamped(without[reference])[0], source)
     shifts = _shifts(steps, reference)
     timed: dict[str, list[Columns]] = {role: [] for role in tables}
     findings: list[Finding] = [*wrong, *_told(steps, pauses, tracks, start_ns), *_described(clock)]
     for role, several in tables.items():
-        for columns in several:
-            own = [
-                (track, after)
-                for name, track, after in zip(roles, tracks, without, strict=True)
-                if name == role and track.topic == columns.topic
-            ]
+        for columns, some in zip(several, by_role[role], strict=True):
+            own = [(mended[track], without[mended[track]]) for track in some]
             one = _timed(role, columns, own, clock, () if source is TimeSource.LOG else shifts)
             if role in _IN_ORDER:
                 one, late = in_order(one)
@@ -113,10 +109,10 @@ def without_repeats(columns: Columns) -> tuple[Columns, Findings]:
     return columns.rows(first), (Finding(Kind.REPEATED, columns.topic, int((~first).sum())),)
 
 
-def _reference(by_role: Mapping[str, Sequence[Track]]) -> Track | None:
+def _reference(by_role: Mapping[str, Sequence[Sequence[Track]]]) -> Track | None:
     """The track whose stamps are the recording's clock; of tf the densest, which is the robot's own odometry."""
     for role in _REFERENCES:
-        tracks = by_role.get(role, ())
+        tracks = [track for some in by_role.get(role, ()) for track in some]
         if tracks:
             return max(tracks, key=len) if role == "tf" else tracks[0]
     return None

@@ -1,23 +1,46 @@
 """Which topic of a log serves which role: by its message type and, where that leaves several, by its name."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
-from navirl_cli.errors import LogError, unknown
+from navirl_cli.errors import MOST_NAMES, LogError, unknown
+from navirl_cli.logs.container.batches import Channel
+from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.messages.reader import Contents
-from navirl_cli.logs.messages.schema import full_name
+from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
+
+#: Before the list of a log's topics in a message.
+HOLDS: Final = "; the log holds "
+#: Most message types of a role that a message lists.
+_MOST_TYPES: Final = 7
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a recording, over all its files and channels."""
+    """The messages of one type on a topic of a recording, over all its files and channels."""
 
     name: str
     type_name: str
     count: int
+    #: Channels of all files, whose definitions may differ.
+    channels: tuple[Channel, ...] = field(default=(), compare=False, repr=False)
+
+    def has(self, paths: Iterable[str]) -> bool:
+        """Whether its definition has these fields; False where it does not parse."""
+        for channel in self.channels[:1]:
+            try:
+                schema = parse_definition(
+                    channel.schema_name, channel.schema_encoding, channel.schema_text, channel.message_encoding
+                )
+                for path in paths:
+                    schema.leaf(path)
+            except SchemaError:
+                return False
+        return True
 
 
 @dataclass(frozen=True)
@@ -42,8 +65,9 @@ class Role:
         return any(one.joined for one in self.message_types)
 
     def message_type(self, topic: Topic) -> MessageType:
-        """The message type of a topic, as it serves this role."""
-        return next(one for one in self.message_types if one.name == topic.type_name)
+        """The message type of a topic, as it serves this role: where releases differ, the first that fits."""
+        named = [one for one in self.message_types if one.name == topic.type_name]
+        return next((one for one in named[:-1] if topic.has(one.fields.values())), named[-1])
 
     def rank(self, topic: Topic) -> tuple[int, int] | None:
         """How well a topic fits, the smallest rank best; None where it serves only if the user names it."""
@@ -135,26 +159,45 @@ def short_name(type_name: str) -> str:
     return type_name.replace("/msg/", "/")
 
 
-def topics_of(contents: Iterable[Contents]) -> dict[str, Topic]:
-    """The topics of the files of a recording by name; of several types on one topic the one with most messages."""
+def topics_of(contents: Iterable[Contents]) -> tuple[Topic, ...]:
+    """The topics of the files of a recording by name; a topic of several types stands once for each."""
     counts: dict[tuple[str, str], int] = {}
+    channels: dict[tuple[str, str], list[Channel]] = {}
     for one in contents:
         for channel in one.channels:
             key = (channel.topic, full_name(channel.schema_name))
             counts[key] = counts.get(key, 0) + one.counts.get(channel.id, 0)
-    found: dict[str, Topic] = {}
-    for (name, type_name), count in sorted(counts.items()):
-        if name not in found or count > found[name].count:
-            found[name] = Topic(name, type_name, count)
-    return found
+            channels.setdefault(key, []).append(channel)
+    return tuple(Topic(*key, count, tuple(channels[key])) for key, count in sorted(counts.items()))
 
 
-def choose(log: str, topics: Mapping[str, Topic], requested: Mapping[str, Sequence[str]]) -> dict[str, Choice]:
+def shared_topics(topics: Iterable[Topic], chosen: Mapping[str, "Choice"]) -> Findings:
+    """The topics that serve a role and hold other types besides."""
+    of_name: dict[str, list[Topic]] = {}
+    for topic in topics:
+        if topic.count:
+            of_name.setdefault(topic.name, []).append(topic)
+    used: dict[str, dict[str, None]] = {}
+    for topic in (topic for choice in chosen.values() for topic in choice.topics):
+        used.setdefault(topic.name, {})[short_name(topic.type_name)] = None
+    return tuple(
+        Finding(
+            Kind.SEVERAL_TYPES,
+            name,
+            detail=f"{', '.join(f'{short_name(one.type_name)} ({one.count})' for one in of_name[name])}; used: "
+            + ", ".join(types),
+        )
+        for name, types in used.items()
+        if len(of_name.get(name, ())) > 1
+    )
+
+
+def choose(log: str, topics: Sequence[Topic], requested: Mapping[str, Sequence[str]]) -> dict[str, Choice]:
     """Choose the topics of every role.
 
     Args:
         log: The recording's name, for messages.
-        topics: Of the recording, by name.
+        topics: Of the recording.
         requested: Names of topics by role, where the user named some.
 
     Returns:
@@ -170,7 +213,7 @@ def choose(log: str, topics: Mapping[str, Topic], requested: Mapping[str, Sequen
     return {role.name: _choice(log, role, topics, requested.get(role.name, ())) for role in ROLES}
 
 
-def _choice(log: str, role: Role, topics: Mapping[str, Topic], requested: Sequence[str]) -> Choice:
+def _choice(log: str, role: Role, topics: Sequence[Topic], requested: Sequence[str]) -> Choice:
     """The topics of one role."""
     if requested:
         named = tuple(_requested(log, role, topics, name) for name in dict.fromkeys(requested))
@@ -179,7 +222,7 @@ def _choice(log: str, role: Role, topics: Mapping[str, Topic], requested: Sequen
             raise LogError(f"{log}: `topic` {role.name}: expected one topic, found {names}; choose one")
         return Choice(role, named, "named by `topic`")
     types = {one.name for one in role.message_types}
-    of_type = [topic for topic in topics.values() if topic.type_name in types]
+    of_type = [topic for topic in topics if topic.type_name in types]
     ranks = {topic: rank for topic in of_type if topic.count and (rank := role.rank(topic)) is not None}
     if not ranks:
         return Choice(role, (), "", _problem(role, of_type))
@@ -195,23 +238,32 @@ def _choice(log: str, role: Role, topics: Mapping[str, Topic], requested: Sequen
     return Choice(role, best, reason + (f"; skipped by name: {', '.join(skipped)}" if skipped else ""))
 
 
-def _requested(log: str, role: Role, topics: Mapping[str, Topic], name: str) -> Topic:
+def _requested(log: str, role: Role, topics: Sequence[Topic], name: str) -> Topic:
     """A topic that the user named."""
     types = [one.name for one in role.message_types]
-    topic = topics.get(name)
-    if topic is not None and topic.type_name in types:
-        return topic
+    named = [topic for topic in topics if topic.name == name]
+    served = sorted((one for one in named if one.type_name in types), key=lambda one: types.index(one.type_name))
+    if served:
+        return served[0]
+    topic = next(iter(named), None)
     field = f"{log}: `topic` {role.name}"
-    fitting = [one.name for one in topics.values() if one.type_name in types]
+    fitting = [one.name for one in topics if one.type_name in types]
     if topic is None and fitting:
         raise LogError(unknown(field, name, fitting))
     found = repr(name) if topic is None else f"{name!r} of type {short_name(topic.type_name)}"
-    raise LogError(f"{field}: expected a topic of type {' or '.join(map(short_name, types))}, found {found}")
+    raise LogError(f"{field}: expected a topic of type {_types(role)}, found {found}")
+
+
+def _types(role: Role) -> str:
+    """The message types of a role, of many the first ones."""
+    names = list(dict.fromkeys(short_name(one.name) for one in role.message_types))
+    more = f" or {len(names) - _MOST_TYPES} others" if len(names) > _MOST_TYPES + 1 else ""
+    return " or ".join(names[:_MOST_TYPES] if more else names) + more
 
 
 def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     """Why a role has no topic, and what to do."""
-    types = " or ".join(short_name(one.name) for one in role.message_types)
+    types = _types(role)
     empty = [topic.name for topic in of_type if not topic.count]
     unlikely = [topic.name for topic in of_type if topic.count]
     notes = f"; {', '.join(empty)} has no messages" if empty else ""
@@ -220,11 +272,25 @@ def _problem(role: Role, of_type: Sequence[Topic]) -> str:
     return f"no {role.name}: expected a topic of type {types}{notes}" + (f"; {role.remedy}" if role.remedy else "")
 
 
-def refusal(log: str, topics: Mapping[str, Topic], choice: Choice) -> LogError:
+def undefined(log: str, topics: Sequence[Topic]) -> LogError | None:
+    """The error that nothing in a log can be decoded, because no topic has a definition."""
+    channels = [channel for topic in topics if topic.count for channel in topic.channels]
+    if not channels or not all(map(lacks_definition, channels)):
+        return None
+    return LogError(
+        f"{log}: none of its {len(topics)} topics has a definition of its messages, so that nothing can be decoded; "
+        "convert it on a computer that has the message packages, for example with ros2 bag convert"
+    )
+
+
+def refusal(log: str, topics: Sequence[Topic], choice: Choice) -> LogError:
     """The error that a log lacks a needed topic."""
     if not topics:
         return LogError(
             f"{log}: holds no messages: the file ends before the first one; copy it again, or use another recording"
         )
-    listed = ", ".join(f"{topic.name} ({short_name(topic.type_name)})" for topic in topics.values())
-    return LogError(f"{log}: {choice.problem}; the log holds {listed}")
+    names = [f"{topic.name} ({short_name(topic.type_name)})" for topic in topics]
+    listed = ", ".join(names[:MOST_NAMES])
+    if len(names) > MOST_NAMES:
+        listed += f" and {len(names) - MOST_NAMES} more"
+    return LogError(f"{log}: {choice.problem}{HOLDS}{listed}")

@@ -83,10 +83,10 @@ def since_first(ns: IntArray) -> FloatArray:
     return (ns - ns[:1]).astype(np.float64) / NS_PER_S
 
 
-def tracks_of(tables: Mapping[str, Sequence[Columns]]) -> dict[str, list[Track]]:
-    """By role the tracks of its topics; of tf one for each pair of frames."""
+def tracks_of(tables: Mapping[str, Sequence[Columns]]) -> dict[str, list[list[Track]]]:
+    """By role, for each of its topics, its tracks: of tf one for each pair of frames."""
     return {
-        role: [track for one in several for track in (pairs_of(one) if role == "tf" else (track_of(one),))]
+        role: [pairs_of(one) if role == "tf" else [track_of(one)] for one in several]
         for role, several in tables.items()
     }
 

@@ -15,7 +15,13 @@ from navirl_cli.logs.roles.times import without_repeats
 _FORCE: Final = ("fx", "fy", "fz")
 
 
-def wrench_of(columns: Columns, context: Context, base: str, named: str | None) -> tuple[Wrench, Findings]:
+#: An axis that the mounting turns by less than this share into the robot's plane does not count there.
+_OUT_OF_PLANE: Final = 0.01
+
+
+def wrench_of(
+    columns: Columns, context: Context, base: str, named: str | None, scale: float = 1.0
+) -> tuple[Wrench, Findings]:
     """Forces in the sensor's frame, and the rotation of that frame.
 
     Args:
@@ -23,12 +29,20 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
         context: The frames.
         base: The robot's own frame.
         named: The frame of the forces where the user names it, in place of the messages'.
+        scale: N for the unit of the messages.
+
+    Returns:
+        The forces in N, and what was found out. An axis that is never finite is 0.
 
     Raises:
         FrameError: tf does not connect the frames.
-        LogError: No force is plausible.
+        LogError: No force is plausible, or one without which the forces in the robot's plane are unknown is missing.
     """
     columns, own, others = in_one_frame(columns)
+    missing = [name for name in _FORCE if len(columns) and not np.isfinite(columns[name]).any()]
+    if len(missing) < len(_FORCE):
+        columns = columns.at(columns.t_ns, **{name: np.zeros(len(columns)) for name in missing})
+    columns = columns.at(columns.t_ns, **{name: columns[name] * scale for name in _FORCE})
     columns, implausible = plausible(columns, FORCES, *_FORCE)
     if len(columns) == 0:
         raise LogError(f"{context.log}: topic {columns.topic}: expected forces, found none that are finite")
@@ -48,6 +62,14 @@ def wrench_of(columns: Columns, context: Context, base: str, named: str | None) 
             "parallel axes with `wrench_frame`"
         ) from error
     turns = mounted.matrices
+    for name in missing:
+        share = float(np.abs(turns[:, :2, _FORCE.index(name)]).max())
+        if share > _OUT_OF_PLANE:
+            raise LogError(
+                f"{context.log}: topic {columns.topic}: force {name[1]} is never finite, and the sensor's mounting "
+                f"{frame!r} on {base!r} turns {share:.0%} of it into the robot's plane; record all axes"
+            )
+        findings.append(Finding(Kind.MISSING_AXIS, columns.topic, detail=name[1]))
     if span is not None:
         findings.append(Finding(Kind.WRENCH_MOVES, frame, detail=base))
     return Wrench(t_ns, force, turns[0] if span is None else turns), tuple(findings)

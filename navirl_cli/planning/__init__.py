@@ -1,0 +1,1 @@
+"""Plan a robot's path in a scene under a learnt reward."""
