@@ -193,6 +193,13 @@ def test_a_pause_while_the_robot_stands_still_is_reported(tmp_path, base):
     check_same(one, base)
 
 
+def test_pauses_between_trials_are_how_it_was_recorded(tmp_path):
+    path, recording, _ = disturbed(tmp_path, scene.both(scene.pause(18.0, 18.8), scene.pause(19.5, 20.2)))
+    assert recording.notes == ()
+    (line,) = overview(Source(path.name, (path,)), {}).findings
+    assert line == "all topics pause 2 times while the robot stands still, by up to 0.80 s, first at 18.0 s"
+
+
 @pytest.mark.parametrize("options", [{"use_chunking": False}, {"chunk_size": 1 << 12}])
 def test_the_order_in_the_file_is_known_in_every_container(tmp_path, base, options):
     path, recording, (one,) = disturbed(tmp_path, scene.computer(10.0, -40.0), **options)

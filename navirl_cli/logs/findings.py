@@ -67,6 +67,10 @@ class Kind(Enum):
             "paused, or a clock jumped"
         ),
     )
+    PAUSES = (
+        _INFO,
+        "{about} pause {count} times while the robot stands still, by up to {size:.2f} s, first at {at_s:.1f} s",
+    )
     NO_RECEIPTS = (_NOTE, "{about} gives no usable times of receipt; stamps and the order in the file are used")
     WRONG_RECEIPTS = (
         _NOTE,

@@ -233,7 +233,7 @@ def _transform_times(
     return np.where(stamps != 0, stamps - clock.apart(replace(one, stamp_ns=stamps), ahead=True), 0)
 
 
-def _told(steps: Iterable[Step], pauses: Iterable[Step], tracks: Sequence[Track], start_ns: int) -> Findings:
+def _told(steps: Iterable[Step], pauses: Sequence[Step], tracks: Sequence[Track], start_ns: int) -> Findings:
     """What steps and pauses say, each once; many steps of one clock together."""
     found: dict[tuple[Kind, str], list[Finding]] = {}
     moved_ns = 0
@@ -252,10 +252,18 @@ def _told(steps: Iterable[Step], pauses: Iterable[Step], tracks: Sequence[Track]
         largest = max((one.size for one in some), key=abs)
         told.append(Finding(Kind.CLOCK_STEPS, about, len(some), largest, some[0].at_s))
     told.sort(key=lambda one: one.at_s or 0.0)
-    for step in pauses:
-        at_s = (step.at_ns - start_ns) / NS_PER_S
-        told.append(Finding(Kind.PAUSE, "all topics", size=step.received_s, at_s=at_s))
-    return tuple(told)
+    return (*told, *_paused(pauses, start_ns))
+
+
+def _paused(pauses: Sequence[Step], start_ns: int) -> Findings:
+    """What pauses of all topics say: a single one may be a step, many are how the recording was made."""
+    sizes = [step.received_s for step in pauses]
+    first_s = (pauses[0].at_ns - start_ns) / NS_PER_S if pauses else 0.0
+    if len(pauses) == 1:
+        return (Finding(Kind.PAUSE, "all topics", size=sizes[0], at_s=first_s),)
+    if pauses:
+        return (Finding(Kind.PAUSES, "all topics", len(pauses), max(sizes), first_s),)
+    return ()
 
 
 def _whose(step: Step, tracks: Iterable[Track]) -> tuple[str, float]:
