@@ -65,11 +65,11 @@ def disturbed(tmp_path, change, **options):
     return path, recording, demonstrations
 
 
-SIZES = [-40.0, -5.0, -0.7, 0.7, 5.0, 40.0]
+#: Size of a step, s, and when it is, s; at 10 s the push is at its peak.
+STEPS = [(-40.0, 10.0), (-5.0, 5.0), (-0.7, 10.0), (0.7, 10.0), (5.0, 5.0), (40.0, 10.0)]
 
 
-@pytest.mark.parametrize("at_s", [5.0, 10.0])
-@pytest.mark.parametrize("by_s", SIZES)
+@pytest.mark.parametrize(("by_s", "at_s"), STEPS)
 @pytest.mark.parametrize(
     ("clock", "whose"), [(scene.computer, COMPUTER), (scene.recorder, RECORDER), (scene.stamps, ROBOT)]
 )
