@@ -26,6 +26,8 @@ _IN_ORDER: Final = ("odometry", "wrench")
 _MOMENTARY: Final = ("goal", "joystick")
 #: Roles whose messages count from their receipt on, whatever their stamps say.
 _AT_RECEIPT: Final = ("map", "tf_static")
+#: No clock steps by more, s: nanoseconds in 63 bits hold no more.
+_LONGEST_S: Final = 9e9
 #: Messages that may overtake each other.
 _OVERTAKEN: Final = 8
 #: More steps of one clock are reported together.
@@ -174,6 +176,8 @@ def _received(tracks: Iterable[Track]) -> dict[str, IntArray]:
 def _shifts(steps: Iterable[Step], reference: Track) -> IntArray:
     """(k,) ns by which stamps of topics with few messages may have to be shifted: 0 first."""
     moved = np.cumsum([0.0, *(step.stamped_s.get(reference, step.received_s) for step in steps)])
+    # steps of a damaged log may add up to more than 63 bits hold
+    moved = moved[np.abs(moved) < _LONGEST_S]
     shifts: IntArray = np.unique(np.round(-moved * NS_PER_S).astype(np.int64))
     return np.concatenate([[0], shifts[shifts != 0]]).astype(np.int64)
 
