@@ -1,6 +1,7 @@
 """Whatever clocks do, a trial comes out as it was, and each step is reported once, with its time, size and clock."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import clock_scene as scene
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.errors import NavirlError
 from navirl_cli.logs.load import load_recording
 from navirl_cli.logs.overview import overview
 from navirl_cli.logs.sources import Source
@@ -205,6 +207,36 @@ def test_the_order_in_the_file_is_known_in_every_container(tmp_path, base, optio
     path, recording, (one,) = disturbed(tmp_path, scene.computer(10.0, -40.0), **options)
     check_same(one, base)
     check_told(path, recording, COMPUTER, 10.0, -40.0)
+
+
+def noise(seed, share, *, of_stamps, of_receipts):
+    def disturbed(seen):
+        rng = np.random.default_rng(seed)
+        hit = rng.random(len(seen.row)) < share
+        stamps = rng.integers(-(2**31), 2**31, len(hit)) * 10**9
+        receipts = rng.integers(0, 2**64, len(hit), dtype=np.uint64)
+        return replace(
+            seen,
+            stamp_ns=np.where(hit & of_stamps, stamps, seen.stamp_ns),
+            received_ns=np.where(hit & of_receipts, receipts, seen.received_ns.astype(np.uint64)),
+        )
+
+    return disturbed
+
+
+@pytest.mark.parametrize(("of_stamps", "of_receipts"), [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("share", [0.01, 0.3, 1.0])
+def test_times_that_are_noise_end_in_a_recording_or_in_one_line(tmp_path, share, of_stamps, of_receipts):
+    seen = noise(7, share, of_stamps=of_stamps, of_receipts=of_receipts)(scene.recorded())
+    path = scene.write(tmp_path / "run.mcap", seen)
+    view = overview(Source(path.name, (path,)), {})
+    try:
+        recording, _ = extracted(path)
+    except NavirlError as error:
+        assert "\n" not in str(error)
+    else:
+        assert recording.notes
+        assert view.findings
 
 
 CASES = Path(__file__).resolve().parent.parent.parent / "shared" / "cases"

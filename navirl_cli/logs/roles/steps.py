@@ -34,8 +34,10 @@ _SAME_S: Final = 0.3
 _EVEN_S: Final = 0.2
 #: Messages that are in flight while a clock steps show the step of one time before that of the other.
 _IN_FLIGHT: Final = 3
-#: A topic with more changes than this has no regular times.
-_MOST: Final = 500
+#: A topic with more changes than the first number, or more steps than the second, has no regular times.
+_MOST, _MOST_STEPS = 2000, 40
+#: Two times in nanoseconds of 63 bits are not farther apart, s.
+_LARGEST_S: Final = 4.6e9
 #: From this distance on a robot has moved, m.
 _MOVED_M: Final = 0.05
 
@@ -66,6 +68,11 @@ class _Change:
     #: Steps of the recorder's clock and of the stamps', s; both positive and equal for what may be a pause.
     received_s: float
     stamped_s: float | None
+
+    @property
+    def size_s(self) -> float:
+        """The larger of both steps, s."""
+        return max(abs(self.received_s), abs(self.stamped_s or 0.0))
 
     @property
     def ahead(self) -> bool:
@@ -111,9 +118,9 @@ def steps_of(tracks: Sequence[Track], path: Path | None) -> tuple[list[Step], li
     dense = sorted((track for track in tracks if track.is_dense), key=lambda one: (not one.is_stamped, one.period_s))
     found: list[Step] = []
     for track in dense:
-        for change in _changes(track):
-            if max(abs(change.received_s), abs(change.stamped_s or 0.0)) > STEP_S:
-                _join(found, change)
+        changes = [one for one in _changes(track) if STEP_S < one.size_s < _LARGEST_S]
+        for change in changes if len(changes) <= _MOST_STEPS else ():
+            _join(found, change)
     steps: list[Step] = []
     unknown: list[Step] = []
     for step in sorted(found, key=lambda one: one.after):
