@@ -50,6 +50,43 @@ class Kind(Enum):
         _NOTE,
         "{about} jumps by {size:+.2f} s {at_s:.1f} s after the start; later times were shifted to continue",
     )
+    CLOCK_STEPS = (
+        _NOTE,
+        (
+            "{about} jumps {count} times, by up to {size:+.2f} s, first {at_s:.1f} s after the start; later times were "
+            "shifted to continue"
+        ),
+    )
+    LATER_RECEIPTS = (
+        _NOTE,
+        "messages on {about} are received {size:+.2f} s later than before from {at_s:.1f} s on; their stamps are used",
+    )
+    PAUSE = (
+        _NOTE,
+        (
+            "{about} pause for {size:.2f} s {at_s:.1f} s after the start, while the robot stands still: the recording "
+            "paused, or a clock jumped"
+        ),
+    )
+    PAUSES = (
+        _INFO,
+        "{about} pause {count} times while the robot stands still, by up to {size:.2f} s, first at {at_s:.1f} s",
+    )
+    NO_RECEIPTS = (_NOTE, "{about} gives no usable times of receipt; stamps and the order in the file are used")
+    WRONG_RECEIPTS = (
+        _NOTE,
+        (
+            "{about} gives {count} times of receipt that cannot be true, such as {detail}; stamps and the order in the "
+            "file are used in their place"
+        ),
+    )
+    STAMPED_AHEAD = (
+        _NOTE,
+        (
+            "{about} is stamped {size:.2f} s ahead, as AMCL does by its transform_tolerance; it is used from its "
+            "receipt on"
+        ),
+    )
     OTHER_CLOCK = (
         _NOTE,
         "{about} is stamped by another clock than {detail}: {size:+.3f} s by the times of receipt; aligned",

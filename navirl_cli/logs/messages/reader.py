@@ -1,9 +1,11 @@
 """Reading logs: the contents of a file, and its messages as columns."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel
@@ -232,15 +234,65 @@ class _Walk:
         return [text for number, text in self.unusable.items() if counted is None or counted.get(number)]
 
     def missing(self, log: LogFile) -> list[str]:
-        """The channels of which the statistics count more messages than were found and than are known to be lost."""
-        counted = _counted(log) or {}
-        return [
-            f"the statistics count {count} messages of {channel.topic}, {self.seen[channel.id]} were found"
-            for channel in log.channels
-            if self.key(channel) in self.builders
-            and channel.id not in self.unusable
-            and (count := counted.get(channel.id, 0)) > self.seen[channel.id] + log.lost.get(channel.id, 0)
-        ]
+        """The wanted channels of which messages are missing."""
+        wanted = [one for one in log.channels if self.key(one) in self.builders and one.id not in self.unusable]
+        return _missing(log, wanted, self.seen)
+
+
+def check(path: Log, progress: Callable[[float], None] | None = None, threads: int | None = None) -> list[Damage]:
+    """Read every message of a file, by the same rule as `read`, and hold message indexes against the messages.
+
+    Args:
+        path: An MCAP file.
+        progress: Called with the share that is done.
+        threads: Number of threads that decompress; by default one for each core, four at most.
+
+    Returns:
+        Its damage.
+
+    Raises:
+        LogError: It is not an MCAP file.
+    """
+    with LogFile(path) as log:
+        listed = log.times()
+    for trust_indexes in (True, False):
+        with LogFile(path, trust_indexes=trust_indexes) as log:
+            times: dict[int, list[IntArray]] = {}
+            results = log.results(
+                lambda _: True, lambda one: (one.channel.id, one.log_time_ns), threads or threads_here()
+            )
+            for number, some in results:
+                times.setdefault(number, []).append(some)
+                if progress is not None:
+                    progress(log.position / log.size)
+            found = {number: np.sort(np.concatenate(several)) for number, several in times.items()}
+            missing = _missing(log, log.channels, {number: len(some) for number, some in found.items()})
+            wrong = [
+                f"the message indexes give other times of receipt of {channel.topic} than its messages"
+                for channel in log.channels
+                if channel.id in found
+                and channel.id in listed
+                and len(found[channel.id]) == len(listed[channel.id])
+                and not np.array_equal(found[channel.id], listed[channel.id])
+            ]
+            damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in (*missing, *wrong))]
+        if not missing:
+            break
+    return damage
+
+
+def _receipts(batch: Batch) -> tuple[int, IntArray]:
+    return batch.channel.id, batch.log_time_ns
+
+
+def _missing(log: LogFile, channels: Iterable[Channel], seen: Mapping[int, int]) -> list[str]:
+    """The channels of which the statistics count more messages than were found and than are known to be lost."""
+    counted = _counted(log) or {}
+    return [
+        f"the statistics count {count} messages of {channel.topic}, {seen.get(channel.id, 0)} were found"
+        for channel in channels
+        if (count := counted.get(channel.id, 0)) > seen.get(channel.id, 0) + log.lost.get(channel.id, 0)
+    ]
 
 
 def _counted(log: LogFile) -> Mapping[int, int] | None:

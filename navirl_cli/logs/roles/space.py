@@ -1,7 +1,7 @@
 """The stage of space: all tables of a recording in one frame."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 from numpy.typing import NDArray
@@ -79,16 +79,7 @@ def in_one_frame(
         ],
         [link for one in tables.get("tf", ()) for link in links_of(_tf_columns(one), one.owner_counts)],
     )
-    refusals: list[NavirlError] = []
-
-    def attempt(place: Callable[[], T]) -> T | None:
-        """What a role gives, or its refusal, so that all refusals are found."""
-        try:
-            return place()
-        except NavirlError as error:
-            refusals.append(error)
-            return None
-
+    attempt = _Attempts()
     topics = tables.get("map", ()) if occupancy is None else ()
     maps = attempt(lambda: maps_in(log, topics)) if topics else None
     fixed = frame or (maps.frame if maps else "") or _MAP_FRAME
@@ -113,12 +104,11 @@ def in_one_frame(
         findings=(
             *(maps.findings if maps else ()),
             *_about_tf(tree, _start_ns(tables)),
-            *(poses[1] if poses else ()),
-            *(wrench[1] if wrench else ()),
+            *(one for part in (poses, wrench) if part for one in part[1]),
             *lost_people,
             *lost_goals,
         ),
-        refusals=tuple(refusals),
+        refusals=tuple(attempt.refusals),
     )
 
 
@@ -128,6 +118,21 @@ def _usual_base(context: Context) -> str:
         return context.base_frame("")[0]
     except FrameError:
         return ""
+
+
+@dataclass(eq=False)
+class _Attempts:
+    """Calls what may refuse a log, so that all refusals are found."""
+
+    refusals: list[NavirlError] = field(default_factory=list)
+
+    def __call__(self, place: Callable[[], T]) -> T | None:
+        """What a role gives; None where it refuses the log."""
+        try:
+            return place()
+        except NavirlError as error:
+            self.refusals.append(error)
+            return None
 
 
 def _first(tables: Tables, role: str) -> Columns | None:
