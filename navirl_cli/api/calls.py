@@ -59,7 +59,7 @@ from navirl_cli.logs.roles.session import MOST_CYCLES
 from navirl_cli.logs.sources import sources_of
 from navirl_cli.parallel import cores
 from navirl_cli.reports.extraction import published_notes
-from navirl_cli.reports.fit import remarks
+from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
 
 
@@ -316,7 +316,11 @@ def fit(
         found, analyses, lost = answers(selected.evidence, found, questions, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
-    notes = (*remarks(selected.demonstrations, earlier, chosen_by=conditions), *fit_warnings(document))
+    notes = (
+        *cannot_learn(selected.demonstrations),
+        *remarks(selected.demonstrations, earlier, chosen_by=conditions),
+        *fit_warnings(document),
+    )
     ended = [] if found.status is Status.CONVERGED else [f"fit: {found.status.value}: {found.status.advice}"]
     _warn([*ended, *lost])
     return FittedReward.of(

@@ -34,7 +34,7 @@ from navirl_cli.irl.fit import PAPER_L2, Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps, select
-from navirl_cli.reports.fit import remarks, report, warnings
+from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
 @click.command(
@@ -174,7 +174,7 @@ def fit(
     if earlier is not None and not initial:
         start = earlier.reward
     questions.check(evidence, start)
-    for line in remarks(chosen, earlier, chosen_by=conditions):
+    for line in cannot_learn(chosen):
         say(line)
     found, analyses, lost = answers(
         evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
@@ -187,7 +187,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in warnings(document):
+    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
         say(line)
     finish(lost)
 

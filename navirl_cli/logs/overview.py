@@ -60,7 +60,7 @@ class Flow:
     offset_s: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Overview:
     """What is in a recording."""
 
