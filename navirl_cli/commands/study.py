@@ -21,6 +21,7 @@ from navirl_cli.commands.shared import (
     merged,
     output_option,
     progress_bar,
+    refuse_inputs,
     samples_option,
     say,
     seed_option,
@@ -99,7 +100,7 @@ def study(
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
-    _check_files(output, force=force)
+    _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)
     with swapped_folder(output) as folder:
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
@@ -172,10 +173,11 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
     )
 
 
-def _check_files(output: Path, *, force: bool) -> None:
-    """Check early that all results can be written.
+def _check_files(output: Path, inputs: Sequence[Path], *, force: bool) -> None:
+    """Check early that all results can be written, and that none is an input.
 
     Raises:
+        UsageError: One is an input.
         ArtefactError: A file exists already, or cannot be written.
     """
     from navirl_cli.figures.study import FORMATS
@@ -184,7 +186,9 @@ def _check_files(output: Path, *, force: bool) -> None:
     names = [output / "figures" / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
     if output.exists() and not output.is_dir():
         raise ArtefactError(f"{output}: expected the name of a folder, found a file; choose another `output`")
-    for path in (*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names):
+    paths = [*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names]
+    refuse_inputs(paths, inputs)
+    for path in paths:
         if path.parent.is_dir():
             check_writable(path, force=force)
 
