@@ -27,6 +27,7 @@ from navirl_cli.commands.usage import Command, Example, as_options, section
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
+from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
@@ -66,7 +67,14 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         type=Choice([steps.value for steps in Steps]),
         default=Steps.ALL.value,
         show_default=True,
-        help="Use all steps of a path, or only those during contact.",
+        help="Use all steps of a path, those during contact, or those during contact or within the person's reach, "
+        "where no push is acceptance (reachable).",
+    ),
+    click.option(
+        "--reach",
+        type=Number(0.1, 100),
+        help="Reach of people, between the centres of robot and person, m.  [default: the largest distance at which "
+        "people pushed]",
     ),
 )
 @section(
@@ -150,6 +158,7 @@ def fit(
     only_corrected: bool,
     truncated: bool,
     steps: str,
+    reach: float | None,
     correct_bias: bool,
     intervals: str | None,
     bootstrap: int | None,
@@ -171,13 +180,15 @@ def fit(
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
     start = _start(initial)
+    everyone = demonstrations_in(demos)
     selected = select(
-        demonstrations_in(demos),
+        everyone,
         conditions=conditions,
         cycle=cycle,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
+        reach_m=reach,
     )
     chosen, evidence = selected.demonstrations, selected.evidence
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
@@ -186,22 +197,24 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
+    plain = _learn(evidence, start, earlier, l2, Method(method))
+    effect = reach_effect(chosen, plain, Steps(steps), reach)
     found, analyses, lost = answers(
         evidence,
-        _learn(evidence, start, earlier, l2, Method(method)),
+        plain,
         questions,
         whole_paths=Steps(steps) is Steps.ALL,
         bars=progress_bar,
     )
     document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps
+        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
+    for line in (*remarks(chosen, earlier, chosen_by=conditions, everyone=everyone), *warnings(document)):
         say(line)
     finish(lost)
 
