@@ -19,7 +19,7 @@ from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look
 #: Opacity of the band.
 _OPACITY = 0.18
 #: Height over width of a panel, and height of its texts, inches.
-_ASPECT, _AROUND_IN = 0.6, 1.0
+_ASPECT, _AROUND_IN = 0.6, 0.85
 
 
 @dataclass(frozen=True)
