@@ -83,7 +83,7 @@ def recovered(number: int) -> Recovered:
     scene = passing_scene()
     evidence = evidence_of(make.drawn(scene, PUBLISHED, DEMONSTRATIONS, SEED + number))
     plain = fit(evidence, Reward.named({}), l2=0.0)
-    held = fit(evidence, plain.reward, l2=PAPER_L2, restarts=False)
+    held = fit(evidence, plain.reward, l2=PAPER_L2, scan=False)
     theta = np.array(plain.reward.theta)
     return Recovered(
         theta, plain.standard_errors, np.array(corrected(evidence, plain).reward.theta), np.array(held.reward.theta)

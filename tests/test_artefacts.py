@@ -305,9 +305,16 @@ def with_profile(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     values = np.array([1.0, 2.0, 3.5])
     profile = Profile("c0", values, np.array([-2.0, 0.0, -2.5]), np.ones((3, 4)), 0.95, 1.1, None)
-    drawn = Bootstrap(np.arange(8.0).reshape(2, 4), failed=1, stopped_early=0, seed=9)
+    drawn = Bootstrap(
+        np.arange(8.0).reshape(2, 4),
+        failed=1,
+        stopped_early=0,
+        seed=9,
+        estimate=np.ones(4),
+        without_one=np.ones((2, 4)),
+    )
     path = tmp_path / "reward.json"
-    document = reward_document(result, [demonstration], [], 0.1, Analyses(drawn, (profile,)))
+    document = reward_document(result, [demonstration], [], 0.1, Analyses(bootstrap=drawn, profiles=(profile,)))
     write_json(path, "reward", document, force=False)
     return path, profile
 

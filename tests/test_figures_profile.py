@@ -286,7 +286,7 @@ def content():
     """A reward file's content with one profile, forged: what the reward is does not matter here."""
     scene = make.scene_on(make.open_grid(8, 5), [0, 2], [7, 2], [[0.4, 0.3]])
     some = make.by_participants(scene, Reward((-32.0, -4.0, -4.0, 3.0)), 2, 3, seed=1)
-    return reward_document(fit(evidence_of(some), Reward.named({})), some, [], 0.1, Analyses(None, (parabola(),)))
+    return reward_document(fit(evidence_of(some), Reward.named({})), some, [], 0.1, Analyses(profiles=(parabola(),)))
 
 
 @pytest.fixture

@@ -75,7 +75,7 @@ def test_terms_equal_their_copies(term):
 @every_term
 def test_starts_lie_within_the_bounds(term):
     for parameter in term.parameters:
-        for start in (parameter.initial, *parameter.restarts):
+        for start in (parameter.initial, *parameter.scan):
             assert parameter.lower <= start <= parameter.upper
         assert parameter.scale > 0
 

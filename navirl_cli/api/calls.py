@@ -46,6 +46,7 @@ from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
+from navirl_cli.irl.intervals import Kind
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import scenes_of
@@ -232,6 +233,7 @@ def fit(
     only_corrected: bool = False,
     steps: str = "all",
     correct_bias: bool = False,
+    intervals: str | None = None,
     bootstrap: int | None = None,
     profile: str | Sequence[str] = (),
     cross_validate: str | None = None,
@@ -249,12 +251,14 @@ def fit(
             initial values.
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
             the parameters that the prior determines. 0 for none.
-        method: "newton" (trust region, two starts) or the paper's gradient ascent, "adam".
+        method: "newton" (trust region, and a scan of sigma_p for other maxima) or the paper's gradient ascent, "adam".
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
         steps: Use "all" steps of a path, or only those during "contact".
         correct_bias: Subtract the first-order bias of maximum likelihood.
+        intervals: "profile", "wald" (from standard errors) or "none"; by default profile with fewer than ten
+            demonstrations or where a standard error leaves the admissible range, else wald.
         bootstrap: Fit this many times with participants drawn with replacement.
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
@@ -280,6 +284,7 @@ def fit(
         texts(profile),
         cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
         seed,
+        None if intervals is None else chosen(Kind, intervals, "intervals"),
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
@@ -299,7 +304,8 @@ def fit(
         method=chosen(Method, method, "method"),
     )
     with _workers(executor) as workers:
-        found, analyses, lost = answers(selected.evidence, found, questions, executor=workers)
+        whole = which is Steps.ALL
+        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
     notes = (*remarks(selected.demonstrations, earlier, chosen_by=conditions), *fit_warnings(document))

@@ -32,6 +32,7 @@ from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
+from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.reports.fit import remarks, report, warnings
@@ -95,7 +96,8 @@ from navirl_cli.reports.fit import remarks, report, warnings
         type=Choice([method.value for method in Method]),
         default=Method.NEWTON.value,
         show_default=True,
-        help="Trust-region Newton from two starts, or the paper's gradient ascent (Adam); both with exact gradients.",
+        help="Trust-region Newton and a scan for other maxima, or the paper's gradient ascent (Adam); both with exact "
+        "gradients.",
     ),
     click.option(
         "--correct-bias",
@@ -105,6 +107,12 @@ from navirl_cli.reports.fit import remarks, report, warnings
 )
 @section(
     "Uncertainty",
+    click.option(
+        "--intervals",
+        type=Choice([kind.value for kind in Kind]),
+        help="95 % intervals from profile likelihoods or from standard errors (wald). Default: profile with fewer than "
+        f"{FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else wald.",
+    ),
     click.option(
         "--bootstrap",
         type=Count(2, 100_000),
@@ -139,6 +147,7 @@ def fit(
     only_corrected: bool,
     steps: str,
     correct_bias: bool,
+    intervals: str | None,
     bootstrap: int | None,
     profiles: tuple[str, ...],
     cross_validate: str | None,
@@ -149,10 +158,11 @@ def fit(
     """Learn a navigation reward from demonstrations.
 
     Exact maximum-entropy inverse reinforcement learning. Linear systems give soft values, expected visits and
-    derivatives; a trust-region Newton method from two starts gives the maximum; the observed information gives
+    derivatives; a trust-region Newton method and a scan over sigma_p give the maximum; the observed information gives
     standard errors.
     """
-    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed)
+    kind = None if intervals is None else Kind(intervals)
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
@@ -172,7 +182,11 @@ def fit(
     for line in remarks(chosen, earlier, chosen_by=conditions):
         say(line)
     found, analyses, lost = answers(
-        evidence, _learn(evidence, start, earlier, l2, Method(method)), questions, bars=progress_bar
+        evidence,
+        _learn(evidence, start, earlier, l2, Method(method)),
+        questions,
+        whole_paths=Steps(steps) is Steps.ALL,
+        bars=progress_bar,
     )
     document = reward_document(
         found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps

@@ -23,6 +23,7 @@ from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
     correlation_table,
+    interval_notes,
     likelihood_table,
     meanings_of_parameters,
     parameter_table,
@@ -77,6 +78,7 @@ def report_of(
         Heading("Parameters"),
         *([Paragraph(_FORMULA)] if learnt.reward.terms == PAPER_TERMS else []),
         parameter_table(content),
+        *interval_notes(content),
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
@@ -119,13 +121,24 @@ def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, se
     seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
     seen = [distance for distance in seen if isfinite(distance)]
     passed = float(np.mean(seen)) if seen else float("nan")
-    return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, np.random.default_rng(seed))
+    front = learnt.intervals[0] if learnt.intervals else None
+    rng = np.random.default_rng(seed)
+    return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, rng, front)
 
 
 def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
-    interval = f" ({one.lower:.3g} to {one.upper:.3g})" if isfinite(one.lower) else ""
+    interval = ""
+    if isfinite(one.lower) or isfinite(one.upper):
+        interval = f" ({_range(one.lower, one.upper)})"
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
+
+
+def _range(lower: float, upper: float) -> str:
+    """An interval in words; an open end is infinite."""
+    if not isfinite(lower):
+        return f"less than {upper:.3g}"
+    return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
 
 
 def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:

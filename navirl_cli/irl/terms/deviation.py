@@ -20,7 +20,6 @@ class Deviation:
             scale=1.0,
             initial=-0.01,
             meaning="reward per step and squared metre from the nominal path",
-            restarts=(-1.0,),  # from the study's start alone, Newton's method stops at 0 on some of its data
         ),
     )
     about_people = False

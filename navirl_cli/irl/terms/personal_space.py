@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.irl.scene import Scene
-from navirl_cli.irl.terms.term import Jet, Parameter
+from navirl_cli.irl.terms.term import Jet, Parameter, geometric
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class PersonalSpace:
             scale=1.0,
             initial=2.0,
             meaning="decay of the personal space with squared distance",
-            restarts=(8.0,),  # a narrow space; wide ones are found from the study's start
+            scan=geometric(1e-3, 1e3, 15),
         ),
     )
     about_people = True

@@ -23,8 +23,15 @@ class Parameter:
     #: Initial value of a fit by default (the study's initial values).
     initial: float
     meaning: str
-    #: Further initial values of a fit: the likelihood may have several maxima in this parameter.
-    restarts: tuple[float, ...] = ()
+    #: Values between the bounds, ascending, at which a fit holds this parameter and looks for other maxima. Empty where
+    #: the parameter enters linearly: given all scanned parameters, the reward is linear in the others, and so the
+    #: log-likelihood is concave in them.
+    scan: tuple[float, ...] = ()
+
+
+def geometric(low: float, high: float, count: int) -> tuple[float, ...]:
+    """Values from low to high whose ratios are equal."""
+    return tuple(low * (high / low) ** (number / (count - 1)) for number in range(count))
 
 
 @dataclass(frozen=True, eq=False)
