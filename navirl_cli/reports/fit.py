@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
-from navirl_cli.irl.reward import parameters_of, terms_with
+from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.terms.term import Parameter
+from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -142,7 +142,14 @@ def _interval(lower: float | None, upper: float | None) -> Interval | None:
 
 def _parameters(content: Mapping[str, Any]) -> tuple[Parameter, ...]:
     """Units, bounds and meanings of the parameters."""
-    return parameters_of(terms_with([one["name"] for one in content["parameters"]]))
+    return parameters_of(terms_of(content))
+
+
+def formula(terms: Sequence[Term]) -> Paragraph:
+    """The reward as a sum of its terms, with what its symbols are."""
+    symbols = dict.fromkeys(sentence for term in terms for sentence in term.symbols)
+    total = " + ".join(f"`{term.formula}`" for term in terms)
+    return Paragraph(" ".join([f"The reward of a step from s to s' is {total}.", *symbols]))
 
 
 def meanings_of_parameters(content: Mapping[str, Any]) -> Bullets:
