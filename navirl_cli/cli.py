@@ -1,5 +1,6 @@
 """The command line. Commands are imported when called. Only this module turns expected errors into messages."""
 
+import errno
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ import click
 from navirl_cli import __version__
 from navirl_cli.commands.lazy import LazyGroup
 from navirl_cli.commands.usage import Example, as_options
+from navirl_cli.documents.inline import printable
 from navirl_cli.errors import NavirlError
 
 #: Summaries of the commands, in the order of the work. The module navirl_cli.commands.NAME holds the command NAME, with
@@ -31,6 +33,10 @@ COMMANDS = {
 }
 
 
+#: Errors of writing to a stream that is no file of ours.
+_FULL = {errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EFBIG}
+
+
 class _Terminated(KeyboardInterrupt):
     """SIGTERM: cleaned up after as Ctrl-C is."""
 
@@ -49,12 +55,12 @@ class _Root(LazyGroup):
         except NavirlError as error:
             if ctx.params.get("debug"):
                 raise
-            line, code = as_options(str(error)), 1
+            line, code = as_options(str(error)), error.exit_code
         except _Terminated:
             line, code = "terminated", 143  # as a shell reports a process that SIGTERM ended
         except KeyboardInterrupt:
             line, code = "interrupted", 130  # the same of SIGINT
-        click.echo(f"navirl: {line}", err=True)
+        click.echo(f"navirl: {printable(line)}", err=True)
         return ctx.exit(code)
 
 
@@ -90,4 +96,10 @@ def main() -> None:
         from navirl_cli.commands.completion import use_whole_words
 
         use_whole_words()
-    sys.exit(cli(prog_name="navirl"))
+    try:
+        cli(prog_name="navirl")
+    except OSError as error:
+        if error.filename is not None or error.errno not in _FULL:
+            raise
+        click.echo(f"navirl: standard output cannot be written: {error.strerror}", err=True)
+        sys.exit(1)

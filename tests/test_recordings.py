@@ -1,5 +1,6 @@
 """Several recordings at once: a bad one does not spoil the others, and what is lost is listed."""
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from shutil import copy
@@ -12,7 +13,7 @@ from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.errors import NavirlError
 from navirl_cli.files import Input
-from navirl_cli.logs.load import LoadOptions
+from navirl_cli.logs.load import LoadOptions, load_recording
 
 LOGS = Path(__file__).parent.parent / "sample_logs"
 
@@ -93,3 +94,35 @@ def test_what_was_lost_is_told_where_no_trial_is_left(tmp_path):
     path = write_run(tmp_path / "run.mcap", Run(odometry_nan=345))
     with pytest.raises(NavirlError, match=r"no trial became a demonstration: trial 1: .*; 345 messages on /odom hold "):
         extracted(path)
+
+
+def test_links_into_nowhere_and_pipes_in_a_folder_are_listed_beside_a_good_log(tmp_path):
+    copy(LOGS / "p01.mcap", tmp_path / "good.mcap")
+    (tmp_path / "gone.mcap").symlink_to(tmp_path / "no such file")
+    os.mkfifo(tmp_path / "pipe.mcap")
+    found = extracted(tmp_path)
+    assert len(found.demonstrations()) == 7
+    assert len(found.lost) == 2
+    assert "gone.mcap: expected an MCAP file, found no file there" in found.lost[0]
+    assert "pipe.mcap: expected an MCAP file, found a pipe or a device" in found.lost[1]
+
+
+def test_an_unexpected_error_in_one_log_is_its_own_and_named(tmp_path, monkeypatch):
+    copy(LOGS / "p01.mcap", tmp_path / "bad.mcap")
+
+    def failing(source, *rest):
+        if source.name == "bad.mcap":
+            raise KeyError("x" * 300)
+        return load_recording(source, *rest)
+
+    monkeypatch.setattr("navirl_cli.demos.recordings.load_recording", failing)
+    with ThreadPoolExecutor(2) as pool:
+        found = extracted(tmp_path / "bad.mcap", LOGS / "p02.mcap", executor=pool)
+    assert len(found.demonstrations()) == 7
+    (line,) = found.lost
+    assert line.startswith("left out: bad.mcap: an unexpected error, KeyError: ")
+    assert "(test_recordings.py:" in line
+    assert "extract this log alone to see the traceback" in line
+    assert len(line) < 300
+    with pytest.raises(KeyError):
+        extracted(tmp_path / "bad.mcap")

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from navirl_cli.documents.sheets import read_sheet
 from navirl_cli.documents.tables import Column, Format, Interval, Spread, Table, is_missing, sort_key, written
 
 DETERMINISTIC = settings(derandomize=True, deadline=None, max_examples=150)
@@ -210,3 +211,19 @@ def test_what_is_no_table_is_refused():
         Table((), ())
     with pytest.raises(TypeError, match=r"a text, a number, a composite or None in a cell, found \[1\]"):
         one_column(Column("a"), [1])
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+cmd|' /C calc'!A0", "-2+3+cmd|x", "@SUM(A1)", "\t=1", "-name"])
+def test_texts_that_begin_like_formulas_are_quoted_in_csv_and_read_back(tmp_path, text):
+    table = Table((Column("name"), Column("value_m")), ((text, -1.5), ("plain", 2.0)))
+    lines = written(table, Format.CSV).splitlines()
+    cells = next(csv.reader(lines[1:2]))
+    assert cells == [f"'{text}", "-1.5"]
+    (tmp_path / "sheet.csv").write_text(written(table, Format.CSV))
+    _, rows = read_sheet(tmp_path / "sheet.csv", ["name", "value_m"], ["name"], "rows")
+    assert rows[0].cells["name"] == " ".join(text.split())
+
+
+def test_coordinates_are_not_quoted_in_csv():
+    table = Table((Column("nominal_m"),), (("-1.5,2; -3e-2,4",),))
+    assert written(table, Format.CSV).splitlines()[1] == '"-1.5,2; -3e-2,4"'

@@ -37,7 +37,7 @@ from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
-from navirl_cli.reports.fit import remarks, report, warnings
+from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
 @click.command(
@@ -128,6 +128,7 @@ def fit(
     conditions: tuple[str, ...],
     cycle: int | None,
     only_corrected: bool,
+    truncated: bool,
     steps: str,
     correct_bias: bool,
     intervals: str | None,
@@ -157,13 +158,14 @@ def fit(
         conditions=conditions,
         cycle=cycle,
         only_corrected=only_corrected,
+        truncated=truncated,
         steps=Steps(steps),
     )
     chosen, evidence = selected.demonstrations, selected.evidence
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
     start = _start(terms, given) if earlier is None else starting(terms, given, earlier.reward)
     questions.check(evidence, start)
-    for line in remarks(chosen, earlier, chosen_by=conditions):
+    for line in cannot_learn(chosen):
         say(line)
     found, analyses, lost = answers(
         evidence,
@@ -180,7 +182,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in warnings(document):
+    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
         say(line)
     finish(lost)
 

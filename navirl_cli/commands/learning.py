@@ -23,6 +23,9 @@ selection_options = section(
         help="Use trials of this condition only; repeatable.",
     ),
     click.option("--cycle", type=int, help="Use trials of this cycle only."),
+    click.option(
+        "--truncated", is_flag=True, help="Also use trials that are cut off, which extract --keep-truncated kept."
+    ),
     click.option("--only-corrected", is_flag=True, help="Use only trials in which the person intervened."),
     click.option(
         "--steps",

@@ -20,6 +20,7 @@ from navirl_cli.documents.text import to_text
 from navirl_cli.irl.models import MODELS, compare_models
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.reports.fit import cannot_learn
 from navirl_cli.reports.models import models_document, models_lost, models_remarks, models_report
 
 
@@ -51,6 +52,7 @@ def models(
     conditions: tuple[str, ...],
     cycle: int | None,
     only_corrected: bool,
+    truncated: bool,
     steps: str,
     models: tuple[tuple[Term, ...], ...],
     l2: float,
@@ -61,8 +63,15 @@ def models(
     Each model is fitted to all participants but one and predicts the steps of that one, for each participant in turn.
     """
     selected = select(
-        demonstrations_in(demos), conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=Steps(steps)
+        demonstrations_in(demos),
+        conditions=conditions,
+        cycle=cycle,
+        only_corrected=only_corrected,
+        truncated=truncated,
+        steps=Steps(steps),
     )
+    for line in cannot_learn(selected.demonstrations):
+        say(line)
     chosen = models or MODELS
     people = len(selected.evidence.several_people("models"))
     with progress_bar("fit", (people + 1) * len(chosen)) as update:

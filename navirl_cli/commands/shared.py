@@ -15,6 +15,7 @@ from navirl_cli.commands.types import Choice, Count, FilePath, OutputPath, Point
 from navirl_cli.commands.usage import Function, as_options
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.trials import Split
+from navirl_cli.documents.inline import printable
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.files import check_writable
 
@@ -36,6 +37,9 @@ topic_option = click.option(
     type=RoleTopic(),
     shell_complete=completion.topics,
     help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
+)
+namespace_option = click.option(
+    "--namespace", metavar="/ROBOT", help="The robot's namespace, in a log of several robots, e.g. /robot1."
 )
 frame_option = click.option("--frame", help="Frame of all results, instead of the map's frame.")
 split_option = click.option(
@@ -106,12 +110,12 @@ def echo_json(document: Any) -> None:
 
 def say(line: str) -> None:
     """A diagnostic on stderr, with options where it names arguments."""
-    click.echo(f"navirl: {as_options(line)}", err=True)
+    click.echo(f"navirl: {printable(' '.join(as_options(line).split()))}", err=True)
 
 
 def echo(text: str) -> None:
     """A result on stdout, with options where it names arguments."""
-    click.echo(as_options(text))
+    click.echo(printable(as_options(text)))
 
 
 def merged(lines: Iterable[str]) -> list[str]:

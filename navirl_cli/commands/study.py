@@ -36,6 +36,7 @@ from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import Input, check_writable, replacing, swapped_folder
+from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
@@ -162,9 +163,11 @@ class _Given:
 def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
     """Logs extracted, or the demonstrations of a file that extract wrote."""
     if len(logs) == 1 and logs[0].suffix == ".json":
-        demonstrations = demonstrations_in(logs[0])
-        notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
-        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, [])
+        held = demonstrations_in(logs[0])
+        demonstrations = whole(held)
+        notes = [f"{one.id}: {note}" for one in demonstrations for note in (*one.notes, *one.warnings)]
+        lost = [f"left out: {one.id} is cut off" for one in held if one.truncated]
+        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, lost)
     with bytes_bar("extract") as update:
         found = extract_recordings(logs, ExtractSettings(), options, progress=update)
     results, demonstrations = found.extractions, found.demonstrations()

@@ -156,7 +156,7 @@ def _new_copy(folder: Path, output: Path, *, without: Path) -> Iterator[Path]:
         raise ArtefactError(
             f"{output}: expected a folder outside of {folder}, found one in it; choose another `output`"
         )
-    temporary = output.with_name(f".{output.name[:100]}.{getpid()}.tmp")
+    temporary = output.with_name(f".{output.name[:40]}.{getpid()}.tmp")
     left_out = folder / without
 
     def ignored(parent: str, names: list[str]) -> list[str]:

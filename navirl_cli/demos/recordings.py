@@ -5,12 +5,13 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from traceback import extract_tb
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
 from navirl_cli.demos.labelling import check_agreement
 from navirl_cli.demos.labels import Label, Labels, labels_by_source
-from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, joined
+from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, TruncatedError, brief, joined
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
@@ -82,7 +83,8 @@ def extract_recordings(
     sources = sources_of(logs, join=join, refused=None if join else refused)
     rows, label_notes = _rows(labels, sources, settings)
     # a lone recording is read here, so that the progress can follow its bytes
-    work = partial(_extracted, settings=settings, options=options, progress=progress if len(sources) == 1 else None)
+    alone = len(sources) + len(refused) == 1
+    work = partial(_extracted, settings=settings, options=options, progress=progress if alone else None, alone=alone)
     good: dict[tuple[str, ...], _Result] = {}
     failed: list[NavirlError] = [*refused]
     for source, result in _counted(
@@ -99,7 +101,8 @@ def extract_recordings(
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
-        raise DemonstrationError(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
+        kind = TruncatedError if all(isinstance(error, TruncatedError) for error in failed) else DemonstrationError
+        raise kind(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),
@@ -146,9 +149,17 @@ def _counted(
 
 
 def _extracted(
-    job: tuple[Source, tuple[Label, ...]], settings: ExtractSettings, options: LoadOptions, progress: Progress | None
+    job: tuple[Source, tuple[Label, ...]],
+    settings: ExtractSettings,
+    options: LoadOptions,
+    progress: Progress | None,
+    *,
+    alone: bool,
 ) -> _Result | NavirlError:
-    """One recording's files and demonstrations, or the reason why it gave none."""
+    """One recording's files and demonstrations, or the reason why it gave none.
+
+    Among others also an unexpected error is a reason: one log never spoils the others.
+    """
     source, labels = job
     try:
         with ThreadPoolExecutor(1) as pool:
@@ -157,3 +168,11 @@ def _extracted(
             return hashes.result(), extraction
     except NavirlError as error:
         return error
+    except Exception as error:
+        if alone:
+            raise
+        last = extract_tb(error.__traceback__)[-1]
+        return LogError(
+            f"{source.name}: an unexpected error, {type(error).__name__}: {brief(str(error))} "
+            f"({Path(last.filename).name}:{last.lineno}); extract this log alone to see the traceback, and report it"
+        )

@@ -81,6 +81,11 @@ def runs_of(text: str) -> tuple[Run, ...]:
     return tuple(run for run in runs if run.text)
 
 
+def printable(text: str) -> str:
+    """A text for a terminal, with its line breaks: characters that steer terminals become U+FFFD."""
+    return "\n".join(_UNPRINTABLE.sub("\ufffd", line.replace("\t", " ")) for line in text.split("\n"))
+
+
 def text_of(text: str) -> str:
     """A text for a terminal: code keeps its backticks, strong text is plain."""
     return "".join(f"`{run.text}`" if run.mark is Mark.CODE else run.text for run in runs_of(text))

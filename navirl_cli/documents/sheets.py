@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
+from navirl_cli.documents.tables import FORMULA
 from navirl_cli.errors import ArtefactError, brief
 
 #: Spreadsheets choose the separator by the language.
@@ -84,11 +85,16 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str
     reader = csv.reader(StringIO(text, newline=""), delimiter=separator, strict=True)
     try:
         for row in reader:
-            cells = [" ".join(cell.split()) for cell in row]
+            cells = [" ".join(_unquoted(cell).split()) for cell in row]
             if any(cells):
                 yield reader.line_num, cells
     except csv.Error as error:
         raise ArtefactError(f"{path}: line {reader.line_num}: expected CSV, found: {error}; {_REMEDY}") from error
+
+
+def _unquoted(cell: str) -> str:
+    """A cell without the quote that keeps a spreadsheet from running it as a formula."""
+    return cell[1:] if cell[:1] == "'" and cell[1:2] in FORMULA else cell
 
 
 def _check_header(where: str, header: list[str], columns: Sequence[str], needed: Sequence[str], rows: str) -> None:

@@ -6,6 +6,7 @@ A cell is a value. The column defines how its numbers are shown. All formats sho
 import csv
 import io
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -251,6 +252,11 @@ def _interval(cell: Interval, numbers: Sequence[str]) -> str:
     return f"above {numbers[0]}" if cell.upper == inf else " to ".join(numbers)
 
 
+#: First characters of formulas in spreadsheets, and texts that begin so without being one: coordinates.
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_COORDINATES = re.compile(r"[-+0-9., ;e]*")
+
+
 class Format(StrEnum):
     """The format of a table."""
 
@@ -288,8 +294,16 @@ def written(table: Table, how: Format = Format.TEXT) -> str:
 def _csv(table: Table) -> str:
     names, rows = _plain(table)
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows([names, *rows])
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(map(_no_formula, names))
+    for row in rows:
+        writer.writerow([_no_formula(cell) if isinstance(cell, str) else cell for cell in row])
     return stream.getvalue().removesuffix("\n")
+
+
+def _no_formula(text: str) -> str:
+    """A text that a spreadsheet does not run: a quote stands before what begins like a formula."""
+    return f"'{text}" if text[:1] in FORMULA and not _COORDINATES.fullmatch(text) else text
 
 
 def _plain_text(table: Table) -> str:

@@ -1,5 +1,7 @@
 """Figures: opened without a display, laid out, and saved completely or not at all."""
 
+import re
+import warnings
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from math import ceil
@@ -13,9 +15,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
+from matplotlib.text import Text
 from matplotlib.ticker import AutoLocator, FixedLocator
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.documents.inline import printable
 from navirl_cli.errors import ArtefactError
 from navirl_cli.figures.style import COLUMN_IN, house_style, look
 from navirl_cli.files import check_writable, replacing
@@ -222,8 +226,20 @@ def check_target(path: Path, *, force: bool = False) -> str:
     return extension
 
 
+#: matplotlib's warning of a character that no font has.
+_GLYPH = re.compile(r"Glyph (\d+) .*missing from font")
+
+
+def _clean_texts(figure: Figure) -> None:
+    """Replace characters that no file format of figures can hold."""
+    for text in figure.findobj(Text):
+        cleaned = printable(text.get_text())
+        if cleaned != text.get_text():
+            text.set_text(cleaned)
+
+
 @house_style()
-def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool = True) -> None:
+def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool = True) -> list[str]:
     """Save a figure in the format of its file's extension: the same figure gives the same bytes.
 
     The figure is laid out first, as by :func:`settle`, unless it has a fixed layout. The file appears completely or not
@@ -235,13 +251,40 @@ def save_figure(figure: Figure, path: Path, *, force: bool = False, trim: bool =
         force: Replace an existing file.
         trim: Remove empty height, as :func:`trim_height`.
 
+    Returns:
+        Notes: characters that no font of the figure has, which are drawn as boxes.
+
     Raises:
         ArtefactError: As in :func:`check_target`, or writing fails.
     """
     extension = check_target(path, force=force)
-    if figure.get_layout_engine() is not None:
-        settle(figure, trim=trim)
+    _clean_texts(figure)
     page = BytesIO()
-    figure.canvas.print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if figure.get_layout_engine() is not None:
+            settle(figure, trim=trim)
+        figure.canvas.print_figure(page, format=extension, dpi=look().dpi, metadata=dict(METADATA[extension]))
     with replacing(path, force=force) as part:
         part.write_bytes(page.getvalue())
+    missing, others = _missing_glyphs(caught)
+    for one in others:
+        warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+    if not missing:
+        return []
+    return [f"{path.name}: no font of the figure has {''.join(missing)}; drawn as boxes; choose other names"]
+
+
+def _missing_glyphs(
+    caught: Sequence[warnings.WarningMessage],
+) -> tuple[list[str], list[warnings.WarningMessage]]:
+    """The characters of which matplotlib warned that no font has them, and its other warnings."""
+    found: dict[str, None] = {}
+    others = []
+    for one in caught:
+        match = _GLYPH.match(str(one.message))
+        if match:
+            found[chr(int(match[1]))] = None
+        else:
+            others.append(one)
+    return list(found), others

@@ -1,5 +1,6 @@
 """Style of all figures: sizes of a page, fonts, looks for paper and screen, and colours."""
 
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -164,7 +165,9 @@ def house_style() -> Iterator[None]:
 
     A matplotlibrc of the user does not change the figures. Earlier settings are restored afterwards.
     """
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        # of a character without a glyph save_figure gives one note, in place of a warning at every measuring
+        warnings.filterwarnings("ignore", r"Glyph \d+ ")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         for part, colour in (("ink", look().ink), ("paper", look().paper)):

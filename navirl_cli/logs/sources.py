@@ -56,7 +56,8 @@ def sources_of(
         LogError: An argument is missing, holds no recording, or is a bag that navirl cannot read.
     """
     errors: list[LogError] = []
-    sources = _once([source for argument in arguments for source in _attempted(_of_argument, argument, errors)])
+    found = [source for argument in arguments for source in _attempted(_of_argument, argument, errors)]
+    sources = _once([source for source in found if _readable(source, errors)])
     if errors and (refused is None or not sources):
         raise errors[0]
     if refused is not None:
@@ -250,6 +251,17 @@ def _missing_pieces(folder: Path, name: str, numbers: Iterable[int]) -> Iterator
         following = number + 1
 
 
+def _readable(source: Source, errors: list[LogError]) -> bool:
+    """Whether a recording's files can be read; if not, the reason is kept."""
+    try:
+        for file in source.files:
+            check_path(file)
+    except LogError as error:
+        errors.append(error)
+        return False
+    return True
+
+
 def _once(sources: Sequence[Source]) -> list[Source]:
     """Read no file twice, also not through a link; of two recordings the one with more files keeps it."""
     owners: dict[tuple[int, int], int] = {}
@@ -257,7 +269,6 @@ def _once(sources: Sequence[Source]) -> list[Source]:
     notes: defaultdict[int, list[str]] = defaultdict(list)
     for number in sorted(range(len(sources)), key=lambda number: -len(sources[number].files)):
         for file in sources[number].files:
-            check_path(file)
             key = (file.stat().st_dev, file.stat().st_ino)
             if key in owners:
                 notes[owners[key]].append(f"{file} is given more than once; read once")

@@ -17,6 +17,7 @@ from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
+from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
 FEW = 10
@@ -308,14 +309,20 @@ def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -
     return float(np.sqrt(np.mean(known**2))) if len(known) else nan
 
 
+def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
+    """What the demonstrations cannot show, which is known before the fit starts."""
+    if any(len(demonstration.people_m) for demonstration in chosen):
+        return []
+    line = (
+        f"none of the {len(chosen)} demonstrations has people, so that the personal space (a_p, sigma_p) cannot be "
+        "learnt from them; extract them again with a people topic, or give places with `person` x,y"
+    )
+    return [line]
+
+
 def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """Choices that the user may not have intended; they are known before the fit starts."""
-    lines = []
-    if not any(len(demonstration.people_m) for demonstration in chosen):
-        lines.append(
-            f"none of the {len(chosen)} demonstrations has people, so that the personal space (a_p, sigma_p) cannot be "
-            "learnt from them; extract them again with a people topic, or give places with `person` x,y"
-        )
+    """Choices that the user may not have intended, and what extraction found unusual."""
+    lines = repeated(chosen)
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(

@@ -32,6 +32,7 @@ from navirl_cli.reports.fit import (
     validation_tables,
     warnings,
 )
+from navirl_cli.reports.repeated import repeated
 
 _CAPTIONS = {
     "paths": "Driven paths by condition; the line is thicker where the person pushed.",
@@ -67,7 +68,7 @@ def report_of(
         made_from: Files and hashes.
         seed: Of the intervals.
     """
-    notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
+    notes = repeated(demonstrations)
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
         *_warnings(content, ranks),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.commands import completion
-from navirl_cli.commands.shared import force_option, output_option
+from navirl_cli.commands.shared import force_option, output_option, say
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
@@ -54,7 +54,9 @@ class Page:
         from navirl_cli.figures.sheet import save_figure
 
         with self.look():
-            save_figure(figure, self.output, force=self.force, trim=trim)
+            notes = save_figure(figure, self.output, force=self.force, trim=trim)
+        for line in notes:
+            say(line)
         click.echo(self.output)
 
     def draw(
