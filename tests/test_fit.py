@@ -142,12 +142,13 @@ def test_a_start_without_a_partition_function_is_refused(many):
 def test_every_status_gives_advice():
     assert [status.value for status in Status] == [
         "converged",
+        "open interval",
         "stopped early",
         "on bound",
         "not identified",
         "infinite partition function",
     ]
-    assert len({status.advice for status in Status}) == 5
+    assert len({status.advice for status in Status}) == 6
 
 
 def test_the_same_evidence_gives_the_same_fit(many):

@@ -332,7 +332,8 @@ def fit(
         *remarks(selected.demonstrations, earlier, chosen_by=conditions),
         *fit_warnings(document),
     )
-    ended = [] if found.status is Status.CONVERGED else [f"fit: {found.status.value}: {found.status.advice}"]
+    reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}
+    ended = [] if reached else [f"fit: {found.status.value}: {found.status.advice}"]
     _warn([*ended, *lost])
     return FittedReward.of(
         learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses

@@ -13,6 +13,7 @@ from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
+from navirl_cli.irl.intervals import Ends
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
@@ -98,11 +99,13 @@ def _by_name(content: Mapping[str, Any], number: int) -> dict[str, Interval]:
     if number >= len(sets):
         return {}
     return {
-        one["name"]: Interval(
-            -inf if one["lower"] is None else one["lower"], inf if one["upper"] is None else one["upper"]
-        )
-        for one in sets[number]["parameters"]
+        one["name"]: interval_cell(Ends(one["name"], one["lower"], one["upper"])) for one in sets[number]["parameters"]
     }
+
+
+def interval_cell(ends: Ends) -> Interval:
+    """An interval as a cell of a table."""
+    return Interval(-inf if ends.lower is None else ends.lower, inf if ends.upper is None else ends.upper)
 
 
 def open_ends(interval: Interval | None, parameter: Parameter) -> str:

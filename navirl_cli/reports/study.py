@@ -19,7 +19,7 @@ from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.reports.evaluation import DECIMALS, group_table
-from navirl_cli.reports.fit import formula
+from navirl_cli.reports.fit import formula, interval_cell
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import FIRST, SECOND, CycleFit, Learnt
 from navirl_cli.study.measures import STUDY_METRICS
@@ -267,7 +267,12 @@ def _properties(groups: Sequence[GroupMetrics]) -> list[Block]:
 
 def _rewards(study: Study) -> list[Block]:
     """Parameters, and how far to rely on them."""
-    blocks: list[Block] = [formula(study.terms), _rewards_table(study), Paragraph(_ERRORS)]
+    blocks: list[Block] = [
+        formula(study.terms),
+        _rewards_table(study),
+        Paragraph(_ERRORS),
+        _intervals_table(study),
+    ]
     pooled = study.pooled.second
     if pooled is not None and study.published_log_likelihood is not None:
         published, here = study.published_log_likelihood, len({one.participant for one in study.seconds})
@@ -332,6 +337,21 @@ def _is_weak(cycle: CycleFit) -> bool:
     """Whether a fit is unsure of a parameter: it did not converge, or a standard error exceeds half of its value."""
     values, errors = np.abs(cycle.fit.reward.theta), cycle.fit.standard_errors
     return cycle.fit.status is not Status.CONVERGED or bool((errors > values / 2).any())
+
+
+def _intervals_table(study: Study) -> Table:
+    """The intervals of the parameters by participant and cycle; an open end has no number."""
+    parameters = parameters_of(study.terms)
+    rows: list[tuple[Cell, ...]] = []
+    for name, found in _cycles(study):
+        if found.intervals:
+            ends = {one.parameter: interval_cell(one) for one in found.intervals[0].ends}
+            rows.append((name, *(ends.get(parameter.name) for parameter in parameters)))
+    columns = (
+        Column("learnt_from", "learnt from"),
+        *(Column(parameter.name, f"{parameter.name} {parameter.unit}".strip(), DECIMALS) for parameter in parameters),
+    )
+    return Table(columns, tuple(rows), "95 % intervals, of several participants from the scatter between them.")
 
 
 def _closeness_table(study: Study) -> Table:

@@ -11,8 +11,10 @@ from navirl_cli.errors import NavirlError
 from navirl_cli.evaluation.compare import LEARNT, ON_GRID, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics
+from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Fit, fit
+from navirl_cli.irl.intervals import Intervals
 from navirl_cli.irl.reward import PAPER_TERMS, Reward
 from navirl_cli.irl.terms.term import Term
 
@@ -36,6 +38,8 @@ class CycleFit:
     fit: Fit
     #: Its policy's paths beside those of the second cycle; None where there is none.
     near: Closeness | None
+    #: Of the parameters, by participant first where there are several.
+    intervals: tuple[Intervals, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ def learn(job: Job) -> Learnt:
         shown = job.of_cycle(cycle)
         try:
             if shown:
-                found[cycle] = CycleFit(fit(evidence_of(shown), reward), None)
+                found[cycle] = _cycle_fit(shown, reward)
                 reward = found[cycle].fit.reward
             if shown and seconds:
                 near = closeness(reward, seconds, job.samples, rng)
@@ -114,6 +118,13 @@ def learn(job: Job) -> Learnt:
         except NavirlError as error:
             problems.append(f"{job.participant or 'all'}, cycle {cycle}: {error}")
     return Learnt(job.participant, found.get(FIRST), found.get(SECOND), tuple(problems))
+
+
+def _cycle_fit(shown: Sequence[Demonstration], start: Reward) -> CycleFit:
+    """The fit of some demonstrations with its intervals."""
+    evidence = evidence_of(shown)
+    found, analyses, _ = answers(evidence, fit(evidence, start), Questions())
+    return CycleFit(found, None, analyses.intervals)
 
 
 def closeness(
