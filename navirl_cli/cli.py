@@ -22,6 +22,7 @@ COMMANDS = {
     "annotate": "Write the labels of trials into a copy of a log.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
+    "models": "Compare rewards by how well they predict participants left out.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, texts, topics_in, within
+from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
@@ -46,11 +46,13 @@ from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
+from navirl_cli.irl.intervals import Kind
 from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.term import Term
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.overview import Overview, overview
@@ -233,6 +235,7 @@ def inspect(
 def fit(
     demos: PathLike | Sequence[Demonstration],
     *,
+    terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
     l2: float = PAPER_L2,
@@ -243,6 +246,7 @@ def fit(
     truncated: bool = False,
     steps: str = "all",
     correct_bias: bool = False,
+    intervals: str | None = None,
     bootstrap: int | None = None,
     profile: str | Sequence[str] = (),
     cross_validate: str | None = None,
@@ -255,18 +259,22 @@ def fit(
 
     Args:
         demos: Demonstrations, or their file.
+        terms: Terms whose sum the reward is: names, separated by commas or in a list, files as "my_term.py:MyTerm", or
+            terms themselves; "length,deviation,personal-space" by default.
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
-        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
-            the parameters that the prior determines. 0 for none.
-        method: "newton" (trust region, two starts) or the paper's gradient ascent, "adam".
+        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
+            of 10 /m, without the parameters that the prior determines. 0 for none.
+        method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, or only those during "contact".
         correct_bias: Subtract the first-order bias of maximum likelihood.
+        intervals: "profile", "wald" (from standard errors) or "none"; by default profile with fewer than ten
+            demonstrations or where a standard error leaves the admissible range, else wald.
         bootstrap: Fit this many times with participants drawn with replacement.
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
@@ -292,6 +300,7 @@ def fit(
         texts(profile),
         cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
         seed,
+        None if intervals is None else chosen(Kind, intervals, "intervals"),
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
@@ -303,7 +312,8 @@ def fit(
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")
-    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
+    given = init if init is None or isinstance(init, Mapping) else reward_in(init)
+    start = starting(terms_in(terms), given, None if earlier is None else earlier.reward)
     questions.check(selected.evidence, start)
     found = fit_reward(
         selected.evidence,
@@ -313,7 +323,8 @@ def fit(
         method=chosen(Method, method, "method"),
     )
     with _workers(executor) as workers:
-        found, analyses, lost = answers(selected.evidence, found, questions, executor=workers)
+        whole = which is Steps.ALL
+        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
     notes = (
@@ -321,7 +332,8 @@ def fit(
         *remarks(selected.demonstrations, earlier, chosen_by=conditions),
         *fit_warnings(document),
     )
-    ended = [] if found.status is Status.CONVERGED else [f"fit: {found.status.value}: {found.status.advice}"]
+    reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}
+    ended = [] if reached else [f"fit: {found.status.value}: {found.status.advice}"]
     _warn([*ended, *lost])
     return FittedReward.of(
         learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses
