@@ -13,7 +13,7 @@ from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
-from navirl_cli.irl.intervals import Ends
+from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Ends
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
@@ -136,7 +136,9 @@ def approximate(content: Mapping[str, Any]) -> str:
     sets = content.get("intervals", [])
     count = len(content["participants"])
     if sets and sets[0]["errors"] == "participant" and count < FEW:
-        return f"Approximate: {count} participants say little about how much people differ."
+        return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
+    if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
+        return "Approximate: with so few demonstrations 85 to 98 % of such intervals cover, rather than 95 %."
     return ""
 
 
