@@ -58,7 +58,7 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
 
 def test_it_warns_of_uncertain_parameters(page):
     assert "<li>Open interval: converged, but the demonstrations set no end to a parameter on one side" in page
-    assert "Approximate: with so few demonstrations 85 to 98 % of such intervals cover, rather than 95 %." in page
+    assert "Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %." in page
     assert "<li>The policy rarely takes paths like those of " not in page
 
 

@@ -182,7 +182,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
+    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document, status=False)):
         say(line)
     finish(lost)
 

@@ -138,7 +138,8 @@ def approximate(content: Mapping[str, Any]) -> str:
     if sets and sets[0]["errors"] == "participant" and count < FEW:
         return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
     if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
-        return "Approximate: with so few demonstrations 85 to 98 % of such intervals cover, rather than 95 %."
+        people = " If people differ they are too narrow: so few say little about that." if 1 < count < FEW else ""
+        return f"Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %.{people}"
     return ""
 
 
@@ -340,11 +341,12 @@ def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, ch
     return lines
 
 
-def warnings(content: Mapping[str, Any]) -> list[str]:
+def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
     """What a user should know before trusting the numbers.
 
     Args:
         content: Of the reward file.
+        status: Whether a status that asks for something is among it.
     """
     parameters = content["parameters"]
     names = [one["name"] for one in parameters]
@@ -368,9 +370,9 @@ def warnings(content: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
         )
-    status = Status(content["status"])
-    if status is not Status.CONVERGED:
-        lines.append(f"{status.value}: {status.advice}")
+    ended = Status(content["status"])
+    if status and ended is not Status.CONVERGED:
+        lines.append(f"{ended.value}: {ended.advice}")
     return lines
 
 
