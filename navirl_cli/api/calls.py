@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, texts, topics_in, within
+from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
@@ -49,10 +49,11 @@ from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import Kind
 from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.term import Term
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.overview import Overview, overview
@@ -235,6 +236,7 @@ def inspect(
 def fit(
     demos: PathLike | Sequence[Demonstration],
     *,
+    terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
     l2: float = PAPER_L2,
@@ -259,12 +261,14 @@ def fit(
 
     Args:
         demos: Demonstrations, or their file.
+        terms: Terms whose sum the reward is: names, separated by commas or in a list, files as "my_term.py:MyTerm", or
+            terms themselves; "length,deviation,personal-space" by default.
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
-        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
-            the parameters that the prior determines. 0 for none.
-        method: "newton" (trust region, and a scan of sigma_p for other maxima) or the paper's gradient ascent, "adam".
+        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
+            of 10 /m, without the parameters that the prior determines. 0 for none.
+        method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
@@ -320,7 +324,8 @@ def fit(
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")
-    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
+    given = init if init is None or isinstance(init, Mapping) else reward_in(init)
+    start = starting(terms_in(terms), given, None if earlier is None else earlier.reward)
     questions.check(selected.evidence, start)
     found = fit_reward(
         selected.evidence,

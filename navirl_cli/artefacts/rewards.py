@@ -27,8 +27,10 @@ from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import Intervals
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.reward import Reward, terms_with
+from navirl_cli.irl.reward import Reward, parameters_of, terms_with
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.registry import names_of, terms_named
+from navirl_cli.irl.terms.term import Term
 
 if TYPE_CHECKING:  # a reader of rewards does not fit again
     from navirl_cli.evaluation.reach import ReachEffect
@@ -115,6 +117,7 @@ def reward_document(
     analyses = analyses or Analyses()
     return {
         "inputs": [vars(one) for one in inputs],
+        "terms": names_of(fit.reward.terms),
         "parameters": _parameters(fit, analyses.bias),
         "covariance": numbers(fit.covariance),
         "covariance_clustered": None if fit.clustered is None else numbers(fit.clustered),
@@ -175,6 +178,25 @@ def _parameters(fit: Fit, expected: FloatArray | None) -> list[dict[str, Any]]:
     ]
 
 
+def terms_of(document: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a reward file's content.
+
+    Raises:
+        RewardError: A term is not installed, or the parameters are not those of the terms.
+    """
+    names = [parameter["name"] for parameter in document["parameters"]]
+    if "terms" not in document:
+        return terms_with(names)  # files from before terms were named
+    terms = terms_named(document["terms"])
+    own = [parameter.name for parameter in parameters_of(terms)]
+    if names != own:
+        raise RewardError(
+            f"parameters: expected {', '.join(own)}, as of the terms {', '.join(document['terms'])}, found "
+            f"{', '.join(names)}"
+        )
+    return terms
+
+
 def read_reward(path: Path) -> LearntReward:
     """A reward of a file.
 
@@ -197,7 +219,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
     try:
-        reward = Reward.named(values, terms_with(names))
+        reward = Reward.named(values, terms_of(document))
     except NavirlError as error:
         raise ArtefactError(f"{path}: {error}") from error
     covariance = [row(one) for one in document["covariance"]]

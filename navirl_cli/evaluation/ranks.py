@@ -206,20 +206,13 @@ def by_group_and_training(ranks: Sequence[Rank]) -> list[GroupRanks]:
 
 def path_log_likelihood(policy: Policy, states: IntArray, moves: IntArray) -> float:
     """Log-probability of a (k,) path's k - 1 moves, nats; -inf where the policy never makes one."""
-    with np.errstate(divide="ignore"):
-        return float(np.log(policy.probability[states[:-1], moves]).sum())
+    return float(policy.log_likelihoods(states, moves).sum())
 
 
 def sampled_log_likelihoods(policy: Policy, paths: SampledPaths) -> FloatArray:
     """(paths,) log-probabilities of paths drawn from the policy, nats."""
-    here, after = paths.states[:, :-1], paths.states[:, 1:]
-    with np.errstate(divide="ignore"):
-        logs = np.log(policy.probability)
-    total = np.zeros(len(paths))
-    for step in range(here.shape[1]):
-        driving = np.flatnonzero(here[:, step] != policy.goal)
-        moves = (policy.lattice.neighbours[here[driving, step]] == after[driving, step, None]).argmax(axis=1)
-        total[driving] += logs[here[driving, step], moves]
+    moves = moves_along(policy.lattice.cells[paths.states])
+    total: FloatArray = policy.log_likelihoods(paths.states, moves).sum(axis=1)
     return total
 
 
