@@ -42,6 +42,7 @@ from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
@@ -245,6 +246,7 @@ def fit(
     only_corrected: bool = False,
     truncated: bool = False,
     steps: str = "all",
+    reach: float | None = None,
     correct_bias: bool = False,
     intervals: str | None = None,
     bootstrap: int | None = None,
@@ -271,7 +273,10 @@ def fit(
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
-        steps: Use "all" steps of a path, or only those during "contact".
+        steps: Use "all" steps of a path, those during "contact", or those in contact or within the person's reach
+            ("reachable"), where no push is acceptance.
+        reach: Reach of people, between the centres of robot and person, m; by default the largest distance at which
+            people pushed.
         correct_bias: Subtract the first-order bias of maximum likelihood.
         intervals: "profile", "wald" (from standard errors) or "none"; by default profile with fewer than ten
             demonstrations or where a standard error leaves the admissible range, else wald.
@@ -306,8 +311,15 @@ def fit(
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
     conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
-        demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, truncated=truncated, steps=which
+        demos,
+        conditions=conditions,
+        cycle=cycle,
+        only_corrected=only_corrected,
+        truncated=truncated,
+        steps=which,
+        reach_m=reach_m,
     )
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
@@ -322,14 +334,17 @@ def fit(
         prior=None if earlier is None else earlier.as_prior(),
         method=chosen(Method, method, "method"),
     )
+    effect = reach_effect(selected.demonstrations, found, which, reach_m)
     with _workers(executor) as workers:
         whole = which is Steps.ALL
         found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
-    document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
+    document = reward_document(
+        found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
+    )
     notes = (
         *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=conditions),
+        *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
         *fit_warnings(document),
     )
     reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}

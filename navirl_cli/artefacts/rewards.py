@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +14,13 @@ from navirl_cli.artefacts.analyses import (
     intervals_of,
     profile_document,
     profile_of,
+    reach_document,
     validation_document,
 )
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
+from navirl_cli.evaluation.groups import by_evidence_group
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
@@ -29,6 +31,9 @@ from navirl_cli.irl.reward import Reward, parameters_of, terms_with
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.registry import names_of, terms_named
 from navirl_cli.irl.terms.term import Term
+
+if TYPE_CHECKING:  # a reader of rewards does not fit again
+    from navirl_cli.evaluation.reach import ReachEffect
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,8 @@ class LearntReward(ByContent):
     status: Status
     #: Profile likelihoods.
     profiles: tuple[Profile, ...] = ()
+    #: Groups of these demonstrations; None for files from before they were written.
+    groups: tuple[str, ...] | None = None
     #: None for files from before it was written.
     search: Search | None = None
     #: Intervals of the parameters, by participant first; none in files from before they were written.
@@ -81,6 +88,7 @@ def reward_document(
     resolution_m: float,
     analyses: Analyses | None = None,
     learnt_from: str = "all",
+    reach: "ReachEffect | None" = None,
 ) -> dict[str, Any]:
     """A fit with its analyses as the content of a reward file.
 
@@ -90,7 +98,8 @@ def reward_document(
         inputs: Files that were read.
         resolution_m: Side of the cells, m.
         analyses: Bootstrap, profiles and cross-validation, where they were asked for.
-        learnt_from: "all" steps or those during "contact".
+        learnt_from: "all" steps, those during "contact", or those "reachable".
+        reach: All steps beside those within reach, where it is known.
     """
     analyses = analyses or Analyses()
     return {
@@ -112,6 +121,8 @@ def reward_document(
         "demonstrations": [demonstration.id for demonstration in demonstrations],
         "participants": sorted({demonstration.participant for demonstration in demonstrations}),
         "learnt_from": learnt_from,
+        "groups": list(by_evidence_group(demonstrations)),
+        "reach": None if reach is None else reach_document(reach),
         "steps": fit.steps,
         "iterations": fit.iterations,
         "evaluations": fit.evaluations,
@@ -207,6 +218,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         covariance=np.array(covariance),
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
+        groups=tuple(document["groups"]) if "groups" in document else None,
         status=Status(document["status"]),
         profiles=profiles,
         intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),

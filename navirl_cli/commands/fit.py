@@ -28,6 +28,7 @@ from navirl_cli.commands.types import Choice, Count, FilePath
 from navirl_cli.commands.usage import Command, Example, as_options, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
+from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
@@ -130,6 +131,7 @@ def fit(
     only_corrected: bool,
     truncated: bool,
     steps: str,
+    reach: float | None,
     correct_bias: bool,
     intervals: str | None,
     bootstrap: int | None,
@@ -153,13 +155,15 @@ def fit(
     given = _given(initial)
     if prior_file is None:
         _start(terms, given)  # refuses wrong words before the work
+    everyone = demonstrations_in(demos)
     selected = select(
-        demonstrations_in(demos),
+        everyone,
         conditions=conditions,
         cycle=cycle,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
+        reach_m=reach,
     )
     chosen, evidence = selected.demonstrations, selected.evidence
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
@@ -167,22 +171,25 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
+    plain = _learn(evidence, start, earlier, l2, Method(method))
+    effect = reach_effect(chosen, plain, Steps(steps), reach)
     found, analyses, lost = answers(
         evidence,
-        _learn(evidence, start, earlier, l2, Method(method)),
+        plain,
         questions,
         whole_paths=Steps(steps) is Steps.ALL,
         bars=progress_bar,
     )
     document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps
+        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document, status=False)):
+    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
     finish(lost)
 

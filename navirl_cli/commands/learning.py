@@ -32,7 +32,14 @@ selection_options = section(
         type=Choice([steps.value for steps in Steps]),
         default=Steps.ALL.value,
         show_default=True,
-        help="Use all steps of a path, or only those during contact.",
+        help="Use all steps of a path, those during contact, or those during contact or within the person's reach, "
+        "where no push is acceptance (reachable).",
+    ),
+    click.option(
+        "--reach",
+        type=Number(0.1, 100),
+        help="Reach of people, between the centres of robot and person, m.  [default: the largest distance at which "
+        "people pushed]",
     ),
 )
 l2_option = click.option(

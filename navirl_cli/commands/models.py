@@ -54,6 +54,7 @@ def models(
     only_corrected: bool,
     truncated: bool,
     steps: str,
+    reach: float | None,
     models: tuple[tuple[Term, ...], ...],
     l2: float,
     as_json: bool,
@@ -69,6 +70,7 @@ def models(
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
+        reach_m=reach,
     )
     for line in cannot_learn(selected.demonstrations):
         say(line)

@@ -18,6 +18,7 @@ from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
+from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -50,6 +51,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
         likelihood_table(content),
         *validation_tables(content),
         *correlation_table(content),
+        *reach_line(content),
         Paragraph(counts(content)),
     ]
 
@@ -326,8 +328,21 @@ def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
     return [line]
 
 
-def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """Choices that the user may not have intended, and what extraction found unusual."""
+def remarks(
+    chosen: Sequence[Demonstration],
+    earlier: LearntReward | None,
+    *,
+    chosen_by: tuple[str, ...],
+    everyone: Sequence[Demonstration] = (),
+) -> list[str]:
+    """Choices that the user may not have intended, what extraction found unusual, and what is not evidence.
+
+    Args:
+        chosen: From which the reward was learnt.
+        earlier: The prior.
+        chosen_by: Conditions that the user named.
+        everyone: Demonstrations of the file.
+    """
     lines = repeated(chosen)
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
@@ -338,7 +353,7 @@ def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, ch
     twice = [] if earlier is None else sorted({d.id for d in chosen} & set(earlier.demonstrations))
     if twice:
         lines.append(f"the prior was learnt from {', '.join(twice)} too: these demonstrations count twice")
-    return lines
+    return [*lines, *evidence_remarks(chosen, everyone)]
 
 
 def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
@@ -365,6 +380,7 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
             if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
         ]
     lines += _bias_warnings(parameters)
+    lines += reach_warnings(content)
     count = len(content["participants"])
     if 1 < count < FEW:
         lines.append(
