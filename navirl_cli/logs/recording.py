@@ -147,7 +147,7 @@ class Recording:
         """Check shapes and that time runs forward."""
         if len(self.t_ns) < 2:
             raise LogError(f"{self.log}: expected poses of a moving robot, found {len(self.t_ns)}")
-        if not (np.diff(self.t_ns) > 0).all():
+        if not (self.t_ns[1:] > self.t_ns[:-1]).all():
             raise LogError(f"{self.log}: pose times must increase")
         if self.xy_m.shape != (len(self.t_ns), 2) or self.yaw_rad.shape != self.t_ns.shape:
             raise LogError(
