@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,8 @@ class Session(ByContent):
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
+#: Longest time between two measurements of a recording, ns (36 years): differences of times must not overflow.
+_LONGEST_NS: Final = 1 << 60
 #: Fewer forces have no bias that could be told from a push.
 LEAST_FORCES = 50
 
@@ -155,6 +158,15 @@ class Recording:
             )
         if self.wrench is not None:
             self._check_wrench(self.wrench.t_ns)
+        for name, t_ns in (
+            ("poses", self.t_ns),
+            ("wrench", self.t_ns[:0] if self.wrench is None else self.wrench.t_ns),
+        ):
+            if len(t_ns) and (span := int(t_ns[-1]) - int(t_ns[0])) > _LONGEST_NS:
+                raise LogError(
+                    f"{self.log}: {name}: expected times of one recording, found {span / 3.156e16:.0f} years between "
+                    "the first and the last; correct the stamps or times of receipt"
+                )
 
     def _check_wrench(self, t_ns: IntArray) -> None:
         """Check that there are enough forces to find a bias, and that they were measured while the robot drove."""
