@@ -4,6 +4,7 @@ Source: the MCAP file format specification, https://mcap.dev/spec. Of each recor
 """
 
 import struct
+from array import array
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -255,7 +256,7 @@ class FoundRecords:
     """The records that a walk over a buffer found."""
 
     #: Offsets of the message records, by channel id, ascending.
-    messages: dict[int, list[int]]
+    messages: "dict[int, array[int]]"
     #: Of each schema and channel record: its code, first byte of its contents, first byte after them.
     definitions: list[tuple[int, int, int]]
     #: Where the walk stopped: at the end of the buffer, at a record that is cut, or at one of another type.
@@ -273,7 +274,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
     Returns:
         The records; `stop` is smaller than `limit` if a record is cut or of another type.
     """
-    messages: dict[int, list[int]] = {}
+    messages: dict[int, array[int]] = {}
     definitions: list[tuple[int, int, int]] = []
     unpack = _MESSAGE_START.unpack_from
     last = limit - HEAD_SIZE
@@ -286,7 +287,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
             if channel in messages:
                 messages[channel].append(at)
             else:
-                messages[channel] = [at]
+                messages[channel] = array("q", (at,))
         else:
             length = RECORD_HEAD.unpack_from(data, at)[1]
             if not (code in {SCHEMA, CHANNEL} or code >= PRIVATE) or at + HEAD_SIZE + length > limit:
