@@ -152,6 +152,7 @@ def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
     assert printed == {key: value for key, value in summary.items() if key not in {"format", "version", "navirl"}}
 
 
+@pytest.mark.slow
 def test_demonstrations_can_stand_in_for_logs(navirl, written, summary, tmp_path):
     out, _ = written
     result = navirl("study", out / "demos.json", "-o", "again", "--samples", 50)

@@ -104,7 +104,8 @@ class Intervals:
 def default_kind(found: Fit) -> Kind:
     """Profiles where there are few demonstrations or where a standard error leaves the admissible range.
 
-    With states of turns a profile takes minutes, so that there standard errors stand, whose ends beyond a bound are open.
+    With states of turns a profile takes minutes, so that standard errors stand there; their ends beyond a
+    bound are open.
     """
     if found.reward.about_turns:
         return Kind.WALD
