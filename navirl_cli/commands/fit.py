@@ -93,8 +93,8 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         "--intervals",
         type=Choice([kind.value for kind in Kind]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
-        f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else wald; "
-        "wald with a term of turns, where profiles take minutes.",
+        f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
+        "wald; wald with a term of turns, where profiles take minutes.",
     ),
     click.option(
         "--bootstrap",
