@@ -48,9 +48,8 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
         Example(
             "Another reward",
-            "navirl fit demos.json --cycle 2 --terms length,saturating-deviation,personal-space,turn -o reward.json",
+            "navirl fit demos.json --cycle 2 --terms length,deviation,length-space -o reward.json",
         ),
-        Example("A profile likelihood", "navirl fit demos.json --cycle 2 --profile sigma_p -o reward.json"),
     ],
 )
 @demos_argument
@@ -93,8 +92,9 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     click.option(
         "--intervals",
         type=Choice([kind.value for kind in Kind]),
-        help="95 % intervals from profile likelihoods or from standard errors (wald). Default: profile with fewer than "
-        f"{FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else wald.",
+        help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
+        f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
+        "wald; wald with a term of turns, where profiles take minutes.",
     ),
     click.option(
         "--bootstrap",
@@ -152,10 +152,10 @@ def fit(
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
-    everyone = demonstrations_in(demos)
     given = _given(initial)
     if prior_file is None:
         _start(terms, given)  # refuses wrong words before the work
+    everyone = demonstrations_in(demos)
     selected = select(
         everyone,
         conditions=conditions,
@@ -188,10 +188,8 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (
-        *remarks(chosen, earlier, chosen_by=conditions, everyone=everyone),
-        *warnings(document, status=False),
-    ):
+    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
     finish(lost)
 
