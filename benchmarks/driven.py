@@ -125,7 +125,7 @@ def _driven(cells: IntArray, grid: Grid, world: World, rng: np.random.Generator)
 
 def _learnt(demonstrations: Sequence[Demonstration], truth: Reward) -> tuple[FloatArray, FloatArray]:
     """Parameters and standard errors; one start at the truth is enough."""
-    found = fit(evidence_of(demonstrations), truth, l2=0.0, restarts=False)
+    found = fit(evidence_of(demonstrations), truth, l2=0.0, scan=False)
     return np.array(found.reward.theta), found.standard_errors
 
 

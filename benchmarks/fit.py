@@ -68,7 +68,7 @@ def ours(demonstrations: list[Demonstration]) -> list[Row]:
     return [
         Row.at_most("value and gradient", 1e3 * gradient_s, "ms", 15),
         Row("value, gradient and Hessian", 1e3 * hessian_s, "ms"),
-        Row.at_most(f"fit of {count} in process", fit_s, "s", 0.25),
+        Row.at_most(f"fit of {count} in process", fit_s, "s", 0.35),
         Row.at_most(f"navirl fit of {count}", command_s, "s", 1.5),
     ]
 

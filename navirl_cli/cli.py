@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from navirl_cli import __version__
+from navirl_cli import __version__, limits
 from navirl_cli.commands.lazy import LazyGroup
 from navirl_cli.commands.usage import Example, as_options
 from navirl_cli.documents.inline import printable
@@ -22,6 +22,7 @@ COMMANDS = {
     "annotate": "Write the labels of trials into a copy of a log.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
+    "models": "Compare rewards by how well they predict participants left out.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",
@@ -77,12 +78,15 @@ class _Root(LazyGroup):
 )
 @click.version_option(__version__, prog_name="navirl")
 @click.option("--debug", is_flag=True, help="Show the traceback of expected errors too.")
-def cli(debug: bool) -> None:
+@click.option("--no-limits", is_flag=True, help="Read files that unpack to much more than their own size.")
+def cli(debug: bool, no_limits: bool) -> None:  # noqa: ARG001 - the group reads it
     """Learn how a robot should drive around people from people who push it.
 
     Exit codes: 0 done; 1 error in the data or files; 2 wrong usage; 3 done, but some data was lost or skipped; 130
     interrupted; 143 terminated.
     """
+    if no_limits:
+        os.environ[limits.VARIABLE] = "1"
 
 
 def main() -> None:
@@ -90,7 +94,9 @@ def main() -> None:
     # The matrices are sparse or small: starting the threads of a BLAS would cost more time than they save. Their number
     # is set before numpy is imported, unless the user has set it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    signal.signal(signal.SIGTERM, _terminate)
+    for number in (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup sets it
+            signal.signal(number, _terminate)
     if "_NAVIRL_COMPLETE" in os.environ:
         from navirl_cli.commands.completion import use_whole_words
 

@@ -1,14 +1,20 @@
 """What a fit is asked besides: refused early, and never at the cost of the fit."""
 
+from dataclasses import replace
+
 import factories as make
+import numpy as np
 import pytest
 
 from navirl_cli.errors import ArgumentError, DemonstrationError, RewardError
 from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.bias import expected_bias, first_order_bias
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import PAPER_L2, fit
+from navirl_cli.irl.intervals import Errors, Kind
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
+from navirl_cli.irl.status import Status
 
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))
@@ -57,7 +63,31 @@ def test_a_failed_analysis_keeps_the_fit_and_the_other_analyses(evidence, monkey
     monkeypatch.setattr("navirl_cli.irl.analyses.profile", no_answer)
     before = fit(evidence, TRUTH)
     found, analyses, lost = answers(evidence, before, Questions(profiles=("c0",), cross_validate=True))
-    assert found is before
+    assert found.reward is before.reward
+    assert found.status in {before.status, Status.OPEN_INTERVAL}
     assert lost == ["a better fit was found"]
     assert analyses.profiles == ()
     assert analyses.validation is not None
+
+
+def test_intervals_belong_to_every_fit_and_open_ones_to_its_status(evidence):
+    plain = fit(evidence, TRUTH)
+    found, analyses, _ = answers(evidence, plain, Questions())
+    assert [one.errors for one in analyses.intervals] == [Errors.PARTICIPANT, Errors.MODEL]
+    assert analyses.intervals[0].kind is Kind.PROFILE, "eight demonstrations"
+    assert (found.status is Status.OPEN_INTERVAL) == analyses.intervals[0].is_open
+    for kind in (Kind.WALD, Kind.NONE):
+        _, analyses, _ = answers(evidence, plain, Questions(intervals=kind))
+        assert [one.kind for one in analyses.intervals] == ([kind, kind] if kind is Kind.WALD else [])
+
+
+def test_the_expected_bias_is_known_for_whole_paths_that_were_not_corrected(evidence):
+    plain = fit(evidence, TRUTH)
+    for questions, whole, known in ((Questions(), True, True), (Questions(), False, False)):
+        _, analyses, _ = answers(evidence, plain, replace(questions, intervals=Kind.NONE), whole_paths=whole)
+        assert (analyses.bias is not None) == known
+    with_prior = replace(plain, l2=0.5)
+    assert expected_bias(evidence, with_prior) is None
+    assert expected_bias(evidence, plain) == pytest.approx(
+        first_order_bias(evidence, plain.reward, np.isfinite(plain.standard_errors))
+    )

@@ -257,7 +257,7 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
     edited(path, lambda d: d["parameters"][0].update(name="c9"))
-    with pytest.raises(ArtefactError, match=r"expected the parameters of known terms \(c0; .*\), found c9, a_g"):
+    with pytest.raises(ArtefactError, match=r"expected c0, a_g, a_p, sigma_p, as of the terms .*, found c9, a_g"):
         read_reward(path)
     edited(path, lambda d: d["parameters"].append({**d["parameters"][0], "name": "c0"}))
     with pytest.raises(ArtefactError, match="found c9, a_g, a_p, sigma_p, c0"):
@@ -305,9 +305,16 @@ def with_profile(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     values = np.array([1.0, 2.0, 3.5])
     profile = Profile("c0", values, np.array([-2.0, 0.0, -2.5]), np.ones((3, 4)), 0.95, 1.1, None)
-    drawn = Bootstrap(np.arange(8.0).reshape(2, 4), failed=1, stopped_early=0, seed=9)
+    drawn = Bootstrap(
+        np.arange(8.0).reshape(2, 4),
+        failed=1,
+        stopped_early=0,
+        seed=9,
+        estimate=np.ones(4),
+        without_one=np.ones((2, 4)),
+    )
     path = tmp_path / "reward.json"
-    document = reward_document(result, [demonstration], [], 0.1, Analyses(drawn, (profile,)))
+    document = reward_document(result, [demonstration], [], 0.1, Analyses(bootstrap=drawn, profiles=(profile,)))
     write_json(path, "reward", document, force=False)
     return path, profile
 

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from statistics import NormalDist
 
 import factories as make
 import numpy as np
@@ -55,7 +56,11 @@ def counts(monkeypatch):
 
 def test_all_demonstrations_of_a_participant_are_drawn_together(twelve, found, counts):
     drawn = bootstrap(twelve, found, 12, 5, executor=Here())
-    assert len(counts) == len(drawn.theta) == 12
+    assert len(drawn.theta) == 12
+    assert len(counts) == 12 + 12, "the draws, and for the acceleration all but one participant each"
+    for count, left_out in zip(counts[12:], np.unique(twelve.participants), strict=True):
+        assert (count == (np.array(twelve.participants) != left_out)).all()
+    del counts[12:]
     names = np.array(twelve.participants)
     for count in counts:
         assert count.sum() == 72, "twelve participants of six demonstrations"
@@ -67,7 +72,7 @@ def test_all_demonstrations_of_a_participant_are_drawn_together(twelve, found, c
 
 def test_a_replicate_is_the_fit_to_the_drawn_participants(twelve, found, counts):
     drawn = bootstrap(twelve, found, 3, 5, executor=Here())
-    for theta, count in zip(drawn.theta, counts, strict=True):
+    for theta, count in zip(drawn.theta, counts[:3], strict=True):
         again = fit(twelve.repeated(count), START, 0.0)
         assert theta == pytest.approx(np.array(again.reward.theta), rel=1e-3, abs=1e-3)
 
@@ -106,7 +111,8 @@ def test_its_errors_are_of_the_size_of_those_clustered_by_participant(twelve, fo
 
 def test_errors_and_intervals_are_those_of_the_replicates():
     theta = np.random.default_rng(0).normal(size=(200, 2))
-    drawn = Bootstrap(theta, 0, 0, 0)
+    # Replicates centred on the estimate, and fits without one participant that are not skewed: plain percentiles.
+    drawn = Bootstrap(theta, 0, 0, 0, np.median(theta, axis=0), np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]]))
     assert drawn.standard_errors == pytest.approx(np.sqrt(((theta - theta.mean(axis=0)) ** 2).sum(axis=0) / 199))
     lower, upper = drawn.interval(0.9)
     assert ((theta < lower).sum(axis=0) == 10).all()
@@ -181,4 +187,35 @@ def test_draws_that_do_not_identify_a_parameter_are_left_out_of_its_errors():
     assert np.isnan(found.theta[:, 2]).sum() == 12 - found.identified_draws[2]
     told = found.theta[np.isfinite(found.theta[:, 2]), 2]
     assert found.standard_errors[2] == pytest.approx(told.std(ddof=1))
-    assert found.interval()[:, 2] == pytest.approx(np.percentile(told, [2.5, 97.5]))
+    lower, upper = found.interval()[:, 2]
+    assert told.min() <= lower < upper <= told.max()
+
+
+def bca(theta, estimate, without_one, level):
+    """The interval as Efron and Tibshirani write it (1993, Eqs. 14.10 to 14.15), parameter by parameter."""
+    normal, ends = NormalDist(), []
+    for column, value, own in zip(theta.T, estimate, without_one.T, strict=True):
+        z0 = normal.inv_cdf(np.mean(column < value))
+        away = own.mean() - own
+        a = sum(away**3) / (6 * sum(away**2) ** 1.5)
+        z = [z0 + normal.inv_cdf(share) for share in (0.5 - level / 2, 0.5 + level / 2)]
+        ends.append([np.percentile(column, 100 * normal.cdf(z0 + one / (1 - a * one))) for one in z])
+    return np.array(ends).T
+
+
+def test_intervals_are_corrected_for_bias_and_acceleration():
+    rng = np.random.default_rng(4)
+    theta, alone = np.exp(rng.normal(size=(300, 2))), np.exp(rng.normal(size=(9, 2)))
+    estimate = np.array([0.8, 1.4])
+    drawn = Bootstrap(theta, 0, 0, 0, estimate, alone)
+    assert drawn.interval(0.9) == pytest.approx(bca(theta, estimate, alone, 0.9))
+    # Without every fit but one there is no acceleration.
+    unknown = Bootstrap(theta, 0, 0, 0, estimate, np.where(alone == alone[0], np.nan, alone))
+    even = np.array([[-1.0, -1.0], [1.0, 1.0]])
+    assert unknown.interval() == pytest.approx(bca(theta, estimate, even, 0.95))
+
+
+def test_an_estimate_outside_all_replicates_has_an_interval():
+    theta = np.random.default_rng(0).normal(size=(50, 1))
+    lower, upper = Bootstrap(theta, 0, 0, 0, np.array([9.0]), np.array([[0.0], [1.0]])).interval()
+    assert theta.min() <= lower <= upper <= theta.max()

@@ -47,7 +47,7 @@ WITHOUT = {
     ),
     *("identified_draws", "counts", "median", "cells_equal", "theta_participants"),
     *("precision", "rank", "rank_biserial", "cohen_dz", "wilcoxon_p", "p_value", "statistic", "level", "l2"),
-    *("condition_number", "mismatch_standard_errors"),
+    *("condition_number", "mismatch_standard_errors", "parameter_count"),
 }
 #: Nanoseconds are for times of day only: beside them, n_s is newton seconds.
 TIMES_NS = {"start_ns", "end_ns"}
@@ -61,6 +61,7 @@ STATISTICS = {
     *(
         "bias_subtracted",
         "parameters",
+        "bias_expected",
         "covariance",
         "covariance_clustered",
         "theta",

@@ -14,10 +14,12 @@ from navirl_cli.evaluation.meaning import (
     passing_penalty,
     tenth_distance_m,
 )
+from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind
 from navirl_cli.irl.reward import Reward
 
 THETA = {"c0": -54.0, "a_g": -0.9, "a_p": -4.9, "sigma_p": 1.7}
 REWARD = Reward(tuple(THETA.values()))
+COVARIANCE = np.diag([9.0, 0.04, 0.5, 0.04])
 
 
 def test_half_and_tenth_of_personal_space():
@@ -54,8 +56,9 @@ def test_intervals_follow_the_covariance():
     found = {one.text.split(" at")[0]: one for one in meanings(REWARD, covariance, 0.1, 0.7, np.random.default_rng(0))}
     half = next(one for text, one in found.items() if "half" in text)
     # Half distance falls with sigma_p: the interval's ends are those of sigma_p, swapped.
-    assert half.lower == pytest.approx(sqrt(log(2) / (1.7 + 1.96 * error)), rel=0.02)
-    assert half.upper == pytest.approx(sqrt(log(2) / (1.7 - 1.96 * error)), rel=0.02)
+    # The decay cannot be negative: its interval is one of its logarithm.
+    assert half.lower == pytest.approx(sqrt(log(2) / (1.7 * exp(1.96 * error / 1.7))), rel=0.02)
+    assert half.upper == pytest.approx(sqrt(log(2) / (1.7 * exp(-1.96 * error / 1.7))), rel=0.02)
     without = [one for text, one in found.items() if "personal-space" not in text and "tenth" not in text]
     assert len(without) >= 2
     tenth = next(one for text, one in found.items() if "tenth" in text)
@@ -71,7 +74,49 @@ def test_the_same_seed_gives_the_same_intervals_and_without_people_there_is_no_d
     assert len(meanings(REWARD, covariance, 0.1, float("nan"), np.random.default_rng(3))) == len(one) - 1
 
 
-def test_draws_beyond_the_bounds_are_held_at_them():
+def interval_of(**ends):
+    return Intervals(Kind.PROFILE, Errors.MODEL, 0.95, tuple(Ends(name, *pair) for name, pair in ends.items()))
+
+
+ENDS = {"c0": (-60.0, -48.0), "a_g": (-1.5, -0.4), "a_p": (-9.0, -3.0), "sigma_p": (0.9, 4.0)}
+
+
+def meant(intervals, covariance=COVARIANCE):
+    found = meanings(REWARD, covariance, 0.1, 0.7, np.random.default_rng(1), intervals)
+    half, tenth, odds, beside, detour = found
+    return {"half": half, "tenth": tenth, "odds": odds, "beside": beside, "detour": detour}
+
+
+def test_quantities_of_one_parameter_have_exactly_its_interval():
+    found = meant(interval_of(**ENDS))
+    for name, share in (("half", 2), ("tenth", 10)):
+        ends = found[name].lower, found[name].upper
+        assert ends == pytest.approx([sqrt(log(share) / 4.0), sqrt(log(share) / 0.9)], rel=0.03)
+    assert (found["odds"].lower, found["odds"].upper) == pytest.approx((exp(-6.0), exp(-4.8)), rel=0.05)
+
+
+def test_correlated_parameters_that_cancel_leave_a_narrow_quantity():
+    # c0 and a_g that move together leave their ratio, the detour, where it is.
+    errors = np.array([3.0, 0.2, 0.5, 0.2])
+    together = np.eye(4)
+    together[0, 1] = together[1, 0] = 0.999
+    apart = together * np.where(np.eye(4) == 1, 1.0, -1.0)
+    ends = {**ENDS, "c0": (-108.0, -27.0), "a_g": (-1.8, -0.45)}
+    narrow, wide = (meant(interval_of(**ends), one * np.outer(errors, errors))["beside"] for one in (together, apart))
+    assert narrow.upper / narrow.lower < 1.1
+    assert wide.upper / wide.lower == pytest.approx(16.0, rel=0.1)
+
+
+def test_open_ends_stay_open_and_no_effect_is_an_end():
+    found = meant(interval_of(**{**ENDS, "a_p": (None, -3.0), "sigma_p": (None, 4.0), "a_g": (-1.5, None)}))
+    assert found["half"].upper == np.inf
+    assert found["half"].lower == pytest.approx(sqrt(log(2) / 4.0), rel=0.03)
+    assert found["detour"].upper == np.inf
+    assert found["beside"].lower == pytest.approx(0.0, abs=3e-3)
+    assert np.isfinite(found["beside"].upper)
+
+
+def test_all_draws_lie_within_the_bounds():
     wild = np.diag([9.0, 0.04, 0.5, 100.0])
     for one in meanings(REWARD, wild, 0.1, 0.7, np.random.default_rng(1)):
         assert np.isfinite([one.lower, one.upper]).all()

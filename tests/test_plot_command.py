@@ -33,7 +33,7 @@ def files(tmp_path_factory):
         replace(demonstration(Condition.JOYSTICK, None, -0.5, people_m=[(0.0, 0.6)]), id="p01/2"),
     ]
     write_json(folder / "demos.json", "demonstrations", demonstrations_document(ones, [], {}), force=False)
-    found = fit(evidence_of(ones), Reward.named({}), restarts=False)
+    found = fit(evidence_of(ones), Reward.named({}), scan=False)
     document = reward_document(found, ones, [], 0.1)
     for parameter, value in zip(document["parameters"], (-20.0, -0.9, -4.9, 1.7), strict=True):
         parameter["value"] = value  # two paths alike would make a policy that knows but one

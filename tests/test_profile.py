@@ -38,7 +38,7 @@ def brute(evidence, name, value, l2=0.0, prior=None):
     best = []
     for theta in (TRUTH.theta, (-60.0, -0.01, -1.0, 1.0), (-25.0, -2.0, -8.0, 6.0)):
         start = Reward.named({**dict(zip(NAMES, theta, strict=True)), name: value})
-        best.append(fit(evidence, start, l2, prior=prior, fixed=(name,), restarts=False).objective)
+        best.append(fit(evidence, start, l2, prior=prior, fixed=(name,), scan=False).objective)
     return max(best)
 
 

@@ -19,7 +19,7 @@ from navirl_cli.irl.validation import cross_validate
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
 START = Reward.named({})
-MODELS = {"learnt": 4, "no person": 2, "shortest path": 1}
+MODELS = {"learnt": (0, 1, 2), "length + personal space": (0, 2), "no person": (0, 1), "length only": (0,)}
 
 
 class Here:
@@ -52,9 +52,11 @@ def test_leaving_one_out_against_a_loop(eight, validated):
         others = evidence_of([one for one in eight if one.participant != name])
         own = evidence_of([one for one in eight if one.participant == name])
         assert validated.steps[k] == own.steps
-        for model, count in MODELS.items():
-            terms = START.terms[: {4: 3, 2: 2, 1: 1}[count]]
-            learnt = fit(others, Reward(START.theta[:count], terms), 1e-3)
+        for model, numbers in MODELS.items():
+            learnt = fit(others, Reward.named({}, tuple(START.terms[number] for number in numbers)), 1e-3)
+            assert validated.sizes[model] == len(learnt.reward.theta)
+            gain = (validated.log_likelihoods["learnt"][k] - validated.log_likelihoods[model][k]) / own.steps
+            assert validated.gain(model)[k] == pytest.approx(gain)
             expected = log_likelihood(own, learnt.reward)
             assert validated.log_likelihoods[model][k] == pytest.approx(expected, rel=1e-9), model
         assert validated.log_likelihoods["uniform"][k] == pytest.approx(own.uniform_log_likelihood())
@@ -70,10 +72,11 @@ def test_leaving_one_out_against_a_loop(eight, validated):
 
 def test_the_model_without_people_lacks_every_term_about_them():
     evidence = evidence_of(mixed(TRUTH, 2, 2, seed=5))
-    start = Reward.named({}, (TERMS["step_length"], Egg()))
+    start = Reward.named({}, (TERMS["length"], Egg()))
     found = cross_validate(evidence, start, 1e-3, executor=Here()).log_likelihoods
-    assert (found["no person"] == found["shortest path"]).all()
-    assert (found["learnt"] != found["shortest path"]).all()
+    # Without the egg there is length alone, which is named once.
+    assert list(found) == ["learnt", "paper", "length + personal space", "no person", "uniform"]
+    assert (found["learnt"] != found["no person"]).all()
 
 
 def test_per_step_is_over_all_steps(validated):
@@ -96,7 +99,7 @@ def test_the_true_model_predicts_better_than_simpler_ones(validated):
     values = [validated.per_step(model) for model in order]
     assert values[0] > values[1] + 0.1 > values[2] + 0.2
     assert (validated.log_likelihoods["learnt"] > validated.log_likelihoods["uniform"]).all()
-    assert list(validated.log_likelihoods) == ["learnt", "no person", "shortest path", "uniform"]
+    assert list(validated.log_likelihoods) == [*MODELS, "uniform"]
 
 
 def test_equal_participants_mispredict_by_about_one_standard_error(validated):

@@ -7,9 +7,11 @@ import numpy as np
 
 from navirl_cli.artefacts.store import number, numbers, row
 from navirl_cli.errors import ArtefactError
+from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind
 from navirl_cli.irl.profile import Profile
 
 if TYPE_CHECKING:  # a reader of rewards does not draw again or leave out
+    from navirl_cli.evaluation.reach import ReachEffect
     from navirl_cli.irl.bootstrap import Bootstrap
     from navirl_cli.irl.validation import Validation
 
@@ -25,8 +27,36 @@ def bootstrap_document(found: "Bootstrap") -> dict[str, Any]:
         "standard_errors": numbers(found.standard_errors),
         "lower": numbers(lower),
         "upper": numbers(upper),
+        "interval": "bca",
         "theta": numbers(found.theta),
     }
+
+
+def intervals_document(found: Intervals) -> dict[str, Any]:
+    """The intervals of all parameters."""
+    return {
+        "method": found.kind.value,
+        "errors": found.errors.value,
+        "level": found.level,
+        "parameters": [{"name": one.parameter, "lower": one.lower, "upper": one.upper} for one in found.ends],
+    }
+
+
+def intervals_of(document: dict[str, Any], names: Sequence[str], path: str) -> Intervals:
+    """Intervals read back; arguments as of :func:`profile_of`.
+
+    Raises:
+        ArtefactError: A parameter is unknown, or the ends are in the wrong order.
+    """
+    ends = []
+    for one in document["parameters"]:
+        lower, upper = one["lower"], one["upper"]
+        if one["name"] not in names:
+            raise ArtefactError(f"{path}: intervals: expected one of {', '.join(names)}, found {one['name']}")
+        if lower is not None and upper is not None and lower > upper:
+            raise ArtefactError(f"{path}: the interval of {one['name']} ends at {upper:g}, below its start {lower:g}")
+        ends.append(Ends(one["name"], lower, upper))
+    return Intervals(Kind(document["method"]), Errors(document["errors"]), document["level"], tuple(ends))
 
 
 def profile_document(found: Profile) -> dict[str, Any]:
@@ -75,7 +105,11 @@ def validation_document(found: "Validation") -> dict[str, Any]:
         "steps": found.steps.tolist(),
         "statuses": [status.value for status in found.statuses],
         "models": {
-            model: {"log_likelihood": numbers(values), "log_likelihood_per_step": number(found.per_step(model))}
+            model: {
+                "log_likelihood": numbers(values),
+                "log_likelihood_per_step": number(found.per_step(model)),
+                "parameter_count": found.sizes[model],
+            }
             for model, values in found.log_likelihoods.items()
         },
         "features": {
@@ -87,4 +121,16 @@ def validation_document(found: "Validation") -> dict[str, Any]:
             }
             for j, parameter in enumerate(found.parameters)
         },
+    }
+
+
+def reach_document(found: "ReachEffect") -> dict[str, Any]:
+    """All steps beside those within reach."""
+    return {
+        "reach_m": found.reach.reach_m,
+        "seen_in": found.reach.seen_in,
+        "steps_reachable": found.steps_reachable,
+        "steps_all": found.steps_all,
+        "min_distance_all_m": found.min_distance_all_m,
+        "min_distance_reachable_m": found.min_distance_reachable_m,
     }

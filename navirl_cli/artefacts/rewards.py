@@ -3,22 +3,37 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.artefacts.analyses import bootstrap_document, profile_document, profile_of, validation_document
+from navirl_cli.artefacts.analyses import (
+    bootstrap_document,
+    intervals_document,
+    intervals_of,
+    profile_document,
+    profile_of,
+    reach_document,
+    validation_document,
+)
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
+from navirl_cli.evaluation.groups import by_evidence_group
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.intervals import Intervals
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.reward import Reward, terms_with
+from navirl_cli.irl.reward import Reward, parameters_of, terms_with
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.registry import names_of, terms_named
+from navirl_cli.irl.terms.term import Term
+
+if TYPE_CHECKING:  # a reader of rewards does not fit again
+    from navirl_cli.evaluation.reach import ReachEffect
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +61,12 @@ class LearntReward(ByContent):
     status: Status
     #: Profile likelihoods.
     profiles: tuple[Profile, ...] = ()
+    #: Groups of these demonstrations; None for files from before they were written.
+    groups: tuple[str, ...] | None = None
     #: None for files from before it was written.
     search: Search | None = None
+    #: Intervals of the parameters, by participant first; none in files from before they were written.
+    intervals: tuple[Intervals, ...] = ()
 
     def as_prior(self) -> Prior:
         """The prior that this fit gives to the next one.
@@ -69,6 +88,7 @@ def reward_document(
     resolution_m: float,
     analyses: Analyses | None = None,
     learnt_from: str = "all",
+    reach: "ReachEffect | None" = None,
 ) -> dict[str, Any]:
     """A fit with its analyses as the content of a reward file.
 
@@ -78,12 +98,14 @@ def reward_document(
         inputs: Files that were read.
         resolution_m: Side of the cells, m.
         analyses: Bootstrap, profiles and cross-validation, where they were asked for.
-        learnt_from: "all" steps or those during "contact".
+        learnt_from: "all" steps, those during "contact", or those "reachable".
+        reach: All steps beside those within reach, where it is known.
     """
     analyses = analyses or Analyses()
     return {
         "inputs": [vars(one) for one in inputs],
-        "parameters": _parameters(fit),
+        "terms": names_of(fit.reward.terms),
+        "parameters": _parameters(fit, analyses.bias),
         "covariance": numbers(fit.covariance),
         "covariance_clustered": None if fit.clustered is None else numbers(fit.clustered),
         "condition_number": number(fit.condition_number),
@@ -99,18 +121,21 @@ def reward_document(
         "demonstrations": [demonstration.id for demonstration in demonstrations],
         "participants": sorted({demonstration.participant for demonstration in demonstrations}),
         "learnt_from": learnt_from,
+        "groups": list(by_evidence_group(demonstrations)),
+        "reach": None if reach is None else reach_document(reach),
         "steps": fit.steps,
         "iterations": fit.iterations,
         "evaluations": fit.evaluations,
         "search": {"log_likelihood": fit.path_log_likelihood.tolist(), "theta": fit.path_theta.tolist()},
+        "intervals": [intervals_document(one) for one in analyses.intervals],
         "bootstrap": None if analyses.bootstrap is None else bootstrap_document(analyses.bootstrap),
         "profiles": [profile_document(one) for one in analyses.profiles],
         "cross_validation": None if analyses.validation is None else validation_document(analyses.validation),
     }
 
 
-def _parameters(fit: Fit) -> list[dict[str, Any]]:
-    """Estimate and errors by parameter."""
+def _parameters(fit: Fit, expected: FloatArray | None) -> list[dict[str, Any]]:
+    """Estimate and errors by parameter; expected is the bias, where it is known and not subtracted."""
     nothing = np.full(len(fit.standard_errors), np.nan)
     robust = nothing if fit.clustered_errors is None else fit.clustered_errors
     biases = nothing if fit.bias is None else fit.bias
@@ -122,20 +147,41 @@ def _parameters(fit: Fit) -> list[dict[str, Any]]:
             "standard_error": number(error),
             "standard_error_clustered": number(clustered),
             "bias_subtracted": number(bias),
+            "bias_expected": number(to_expect),
             "identified": bool(identified),
             "on_bound": bool(on_bound),
         }
-        for parameter, value, error, clustered, bias, identified, on_bound in zip(
+        for parameter, value, error, clustered, bias, to_expect, identified, on_bound in zip(
             fit.reward.parameters,
             fit.reward.theta,
             fit.standard_errors,
             robust,
             biases,
+            nothing if expected is None else expected,
             fit.identified,
             fit.on_bound,
             strict=True,
         )
     ]
+
+
+def terms_of(document: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a reward file's content.
+
+    Raises:
+        RewardError: A term is not installed, or the parameters are not those of the terms.
+    """
+    names = [parameter["name"] for parameter in document["parameters"]]
+    if "terms" not in document:
+        return terms_with(names)  # files from before terms were named
+    terms = terms_named(document["terms"])
+    own = [parameter.name for parameter in parameters_of(terms)]
+    if names != own:
+        raise RewardError(
+            f"parameters: expected {', '.join(own)}, as of the terms {', '.join(document['terms'])}, found "
+            f"{', '.join(names)}"
+        )
+    return terms
 
 
 def read_reward(path: Path) -> LearntReward:
@@ -160,7 +206,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
     try:
-        reward = Reward.named(values, terms_with(names))
+        reward = Reward.named(values, terms_of(document))
     except NavirlError as error:
         raise ArtefactError(f"{path}: {error}") from error
     covariance = [row(one) for one in document["covariance"]]
@@ -172,8 +218,10 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         covariance=np.array(covariance),
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
+        groups=tuple(document["groups"]) if "groups" in document else None,
         status=Status(document["status"]),
         profiles=profiles,
+        intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),
         search=_search(document.get("search"), len(names), path),
     )
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from math import floor, isfinite, isnan, log10
+from math import floor, inf, isfinite, isinf, isnan, log10
 from numbers import Integral, Real
 from typing import TypeAlias
 
@@ -38,9 +38,9 @@ class Spread:
 class Interval:
     """An interval between two values."""
 
-    #: In the unit of the column; NaN for a missing interval.
+    #: In the unit of the column; NaN for a missing interval, -inf for an open end.
     lower: float
-    #: In the same unit.
+    #: In the same unit; inf for an open end.
     upper: float
 
 
@@ -158,7 +158,7 @@ def _plain(table: Table) -> tuple[list[str], list[list[Plain]]]:
         parts = next((_PARTS[type(cell)] for cell in cells if type(cell) in _PARTS), None)
         names += [column.name] if parts is None else [f"{column.name}_{part}" for part in parts]
         values = [_parts(cell) for cell in cells]
-        columns += [[_known(own[k]) if k < len(own) else None for own in values] for k in range(len(parts or [""]))]
+        columns += [[_closed(own[k]) if k < len(own) else None for own in values] for k in range(len(parts or [""]))]
     return names, [list(row) for row in zip(*columns, strict=True)]
 
 
@@ -181,6 +181,12 @@ def _known(value: Plain) -> Plain:
     if isinstance(value, Integral):
         return int(value)
     return None if isnan(value) else float(value)
+
+
+def _closed(value: Plain) -> Plain:
+    """A value for programs: None for an open end too."""
+    known = _known(value)
+    return None if isinstance(known, float) and isinf(known) else known
 
 
 def _is_numeric(cells: Sequence[Cell]) -> bool:
@@ -234,7 +240,16 @@ def _joined(cell: Cell, numbers: Sequence[str]) -> str:
         return "yes" if cell else "no"
     if isinstance(cell, str):
         return cell
-    return (" to " if isinstance(cell, Interval) else " ± ").join(numbers)
+    if isinstance(cell, Interval):
+        return _interval(cell, numbers)
+    return " ± ".join(numbers)
+
+
+def _interval(cell: Interval, numbers: Sequence[str]) -> str:
+    """An interval as text; open ends have no number."""
+    if cell.lower == -inf:
+        return "open" if cell.upper == inf else f"below {numbers[1]}"
+    return f"above {numbers[0]}" if cell.upper == inf else " to ".join(numbers)
 
 
 #: First characters of formulas in spreadsheets, and texts that begin so without being one: coordinates.
@@ -288,7 +303,7 @@ def _csv(table: Table) -> str:
 
 def _no_formula(text: str) -> str:
     """A text that a spreadsheet does not run: a quote stands before what begins like a formula."""
-    return f"'{text}" if text[:1] in FORMULA and not _COORDINATES.fullmatch(text) else text
+    return f"'{text}" if text.lstrip("'")[:1] in FORMULA and not _COORDINATES.fullmatch(text) else text
 
 
 def _plain_text(table: Table) -> str:

@@ -3,16 +3,20 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import exp, log, pi, sqrt
+from math import exp, inf, isfinite, isinf, log, nan, pi, sqrt
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import BoolArray, FloatArray
 from navirl_cli.evaluation.groups import LEVEL
+from navirl_cli.irl.intervals import Intervals
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.uncertainty import correlation
 
-#: Draws from the estimate's normal distribution, for intervals.
+#: Draws of the parameters, for intervals.
 DRAWS = 4000
+#: Half the width of a 95 % interval of a normal estimate, in standard errors.
+WIDTH = 1.959964
 #: Additional distance that a detour gains, and a distance beside the nominal path, m.
 MORE_M, BESIDE_M = 0.1, 0.5
 
@@ -28,7 +32,7 @@ class Meaning:
     text: str
     unit: str
     value: float
-    #: 95 % interval from the covariance; NaN where a parameter that it needs has no variance.
+    #: 95 % interval by that of the parameters; NaN where one of them has none, infinite where an end is open.
     lower: float
     upper: float
 
@@ -74,7 +78,12 @@ def beside_detour_m(theta: Theta, resolution_m: float) -> float:
 
 
 def meanings(
-    reward: Reward, covariance: FloatArray, resolution_m: float, distance_m: float, rng: np.random.Generator
+    reward: Reward,
+    covariance: FloatArray,
+    resolution_m: float,
+    distance_m: float,
+    rng: np.random.Generator,
+    intervals: Intervals | None = None,
 ) -> list[Meaning]:
     """All quantities of a reward in metres.
 
@@ -84,21 +93,30 @@ def meanings(
         resolution_m: Side of the cells that it was learnt on, m.
         distance_m: At which people were passed, centre to centre, m; NaN without people.
         rng: Source of randomness of the intervals.
+        intervals: Of the parameters; by default from the covariance.
     """
     names = [parameter.name for parameter in reward.parameters]
     estimate = dict(zip(names, reward.theta, strict=True))
-    known = np.isfinite(np.diag(covariance))
-    draws = _draws(reward, covariance, known, rng)
+    ends = _ends(reward, covariance, intervals)
+    draws, beyond = _draws(reward, covariance, ends, rng)
     found = []
     for text, unit, on, value in _quantities(resolution_m, distance_m):
-        lower = upper = float("nan")
         if not set(on) <= set(names):
             continue
-        if all(known[names.index(name)] for name in on):
-            drawn = [value(dict(zip(names, row, strict=True))) for row in draws]
-            lower, upper = (float(edge) for edge in np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+        lower = upper = float("nan")
+        if all(name in ends for name in on):
+            drawn = np.array([value(dict(zip(names, row, strict=True))) for row in draws.tolist()])
+            endless = np.asarray(beyond[:, [names.index(name) for name in on]].any(axis=1))
+            lower, upper = _quantiles(drawn, endless, value(estimate))
         found.append(Meaning(text, unit, value(estimate), lower, upper))
     return found
+
+
+def _quantiles(drawn: FloatArray, endless: BoolArray, estimate: float) -> tuple[float, float]:
+    """The interval of a quantity from its draws, of which some belong to open ends of a parameter."""
+    lower, upper = (float(edge) for edge in np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+    above, below = (float((endless & mask).mean()) > (1 - LEVEL) / 2 for mask in (drawn > estimate, drawn < estimate))
+    return -inf if below else lower, inf if above else upper
 
 
 def _quantities(resolution_m: float, distance_m: float) -> list[Quantity]:
@@ -134,20 +152,59 @@ def _quantities(resolution_m: float, distance_m: float) -> list[Quantity]:
     return wanted
 
 
-def _draws(reward: Reward, covariance: FloatArray, known: np.ndarray, rng: np.random.Generator) -> list[list[float]]:
-    """(DRAWS, k) parameters around the estimate, within their bounds."""
-    theta = np.tile(reward.theta, (DRAWS, 1))
-    if known.any():
-        block = covariance[np.ix_(known, known)]
-        theta[:, known] = rng.multivariate_normal(theta[0, known], block, DRAWS, method="eigh")
-    # A decay of zero and a path without cost would divide by zero.
-    least = {"sigma_p": 1e-3}
-    most = {"c0": -1e-3}
+def _ends(reward: Reward, covariance: FloatArray, intervals: Intervals | None) -> dict[str, tuple[float, float]]:
+    """Ends of the parameters' intervals by name, infinite where they are open.
+
+    Without intervals they follow from the standard errors, on a logarithm where a parameter cannot change its sign.
+    """
+    if intervals is not None:
+        return {
+            one.parameter: (-inf if one.lower is None else one.lower, inf if one.upper is None else one.upper)
+            for one in intervals.ends
+        }
+    found = {}
+    for j, (parameter, value) in enumerate(zip(reward.parameters, reward.theta, strict=True)):
+        error = WIDTH * sqrt(covariance[j, j]) if covariance[j, j] >= 0 else nan
+        if isfinite(error):
+            low, high = value - error, value + error
+            if parameter.lower >= 0 or parameter.upper <= 0:
+                low, high = sorted((value * exp(-error / abs(value)), value * exp(error / abs(value))))
+            found[parameter.name] = (low, high)
+    return found
+
+
+def _draws(
+    reward: Reward, covariance: FloatArray, ends: Mapping[str, tuple[float, float]], rng: np.random.Generator
+) -> tuple[FloatArray, BoolArray]:
+    """(DRAWS, k) parameters whose 95 % intervals are those given, with the correlations of the estimate.
+
+    Each side of a parameter is half a normal distribution; the decay and what cannot change its sign have it on a
+    logarithm. (DRAWS, k) whether a draw lies towards an open end; it has the value of the parameter's bound.
+    """
+    theta, beyond = np.tile(reward.theta, (DRAWS, 1)), np.zeros((DRAWS, len(reward.theta)), dtype=bool)
+    matrix = np.nan_to_num(correlation(covariance))
+    np.fill_diagonal(matrix, 1.0)
+    normal = rng.multivariate_normal(np.zeros(len(theta[0])), matrix, DRAWS, method="eigh") / WIDTH
     for j, parameter in enumerate(reward.parameters):
+        if parameter.name not in ends:
+            continue
+        low, high = ends[parameter.name]
+        # No effect at all is an end that can be computed with.
         low, high = (
-            max(parameter.lower, least.get(parameter.name, -np.inf)),
-            min(parameter.upper, most.get(parameter.name, np.inf)),
+            0.0 if isinf(end) and bound == 0 else end
+            for end, bound in ((low, parameter.lower), (high, parameter.upper))
         )
-        theta[:, j] = np.clip(theta[:, j], low, high)
-    rows: list[list[float]] = theta.tolist()
-    return rows
+        for mask, end, bound in ((normal[:, j] < 0, low, parameter.lower), (normal[:, j] >= 0, high, parameter.upper)):
+            if isinf(end):
+                theta[mask, j], beyond[mask, j] = bound, True
+            else:
+                theta[mask, j] = _towards(reward.theta[j], end, np.abs(normal[mask, j]))
+        theta[:, j] = np.clip(theta[:, j], parameter.lower, parameter.upper)
+    return theta, beyond
+
+
+def _towards(value: float, end: float, share: FloatArray) -> FloatArray:
+    """A value moved by shares of the distance to an end, by ratios where both have one sign."""
+    if value * end > 0:
+        return np.asarray(value * (end / value) ** share)
+    return np.asarray(value + (end - value) * share)

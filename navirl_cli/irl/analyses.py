@@ -3,16 +3,19 @@
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import ArgumentError, NavirlError
-from navirl_cli.irl.bias import corrected
+from navirl_cli.irl.bias import corrected, expected_bias
 from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit
+from navirl_cli.irl.intervals import Intervals, Kind, default_kind, intervals
 from navirl_cli.irl.profile import Profile, number_of, profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
+from navirl_cli.irl.status import Status
 from navirl_cli.irl.validation import Validation, cross_validate
 
 #: Called with the number of steps done and a short text on the present one.
@@ -35,6 +38,8 @@ class Questions:
     cross_validate: bool = False
     #: Seed of the bootstrap's draws.
     seed: int = 0
+    #: How intervals are computed; None: by the number of demonstrations.
+    intervals: Kind | None = None
 
     def check_arguments(self, steps: Steps, *, prior: bool, l2: float) -> None:
         """Refuse requests that no data can answer, before anything is read.
@@ -72,10 +77,14 @@ class Questions:
                 evidence.several_people(name)
 
 
-@dataclass(frozen=True)
-class Analyses:
+@dataclass(frozen=True, eq=False)
+class Analyses(ByContent):
     """The results of the analyses."""
 
+    #: Intervals of the parameters, by participant first where there are several.
+    intervals: tuple[Intervals, ...] = ()
+    #: (k,) expected bias of the fit, in the parameters' units; None where it is unknown or subtracted.
+    bias: FloatArray | None = None
     bootstrap: Bootstrap | None = None
     profiles: tuple[Profile, ...] = ()
     validation: Validation | None = None
@@ -91,6 +100,7 @@ def answers(
     found: Fit,
     questions: Questions,
     *,
+    whole_paths: bool = True,
     executor: Executor | None = None,
     bars: Bars = no_bars,
 ) -> tuple[Fit, Analyses, list[str]]:
@@ -100,6 +110,7 @@ def answers(
         evidence: The demonstrated steps of the fit.
         found: The fit.
         questions: The requested analyses.
+        whole_paths: Whether all steps of each path count, so that the bias of the fit can be computed.
         executor: Where to compute; by default local processes.
         bars: Opens a progress bar for each analysis.
 
@@ -110,9 +121,15 @@ def answers(
     lost: list[str] = []
     drawn = validation = None
     followed = []
+    measured, bias = _measured(evidence, found, questions, bars, lost), None
     if questions.correct_bias:
         with _kept(lost):
             found = corrected(evidence, found)
+        measured = tuple(one.moved(found) for one in measured)
+    elif whole_paths:
+        bias = expected_bias(evidence, found)
+    if found.status is Status.CONVERGED and measured and measured[0].is_open:
+        found = replace(found, status=Status.OPEN_INTERVAL)
     if questions.bootstrap:
         with _kept(lost), bars("bootstrap", questions.bootstrap) as update:
             drawn = bootstrap(evidence, found, questions.bootstrap, questions.seed, executor=executor, progress=update)
@@ -122,7 +139,21 @@ def answers(
     if questions.cross_validate:
         with _kept(lost), bars("cross-validation", len(evidence.people)) as update:
             validation = cross_validate(evidence, found.initial, found.l2, executor=executor, progress=update)
-    return found, Analyses(drawn, tuple(followed), validation), lost
+    return found, Analyses(measured, bias, drawn, tuple(followed), validation), lost
+
+
+def _measured(
+    evidence: Evidence, found: Fit, questions: Questions, bars: Bars, lost: list[str]
+) -> tuple[Intervals, ...]:
+    """The intervals of the parameters; none where the search did not reach a maximum."""
+    kind = default_kind(found) if questions.intervals is None else questions.intervals
+    if kind is Kind.NONE or found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+        return ()
+    if kind is Kind.WALD:
+        return intervals(evidence, found, kind)
+    with _kept(lost), bars("intervals", len(found.reward.theta)) as update:
+        return intervals(evidence, found, kind, update)
+    return ()
 
 
 @contextmanager

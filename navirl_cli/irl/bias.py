@@ -62,6 +62,27 @@ def first_order_bias(evidence: Evidence, reward: Reward, identified: NDArray[np.
     return bias
 
 
+def expected_bias(evidence: Evidence, found: Fit) -> FloatArray | None:
+    """(k,) bias to expect of a fit to whole paths, in the parameters' units.
+
+    None where it is not known: the fit is not at a maximum of the likelihood alone, or no parameter has a standard
+    error, or there is no policy close by.
+    """
+    identified = np.isfinite(found.standard_errors)
+    if not (_is_plain(found) and identified.any()):
+        return None
+    try:
+        return first_order_bias(evidence, found.reward, identified)
+    except RewardError:
+        return None
+
+
+def _is_plain(found: Fit) -> bool:
+    """Whether a fit is at a maximum of the likelihood alone, or with the paper's small regulariser."""
+    ended = found.status not in {Status.STOPPED_EARLY, Status.INFINITE}
+    return ended and found.prior is None and found.l2 <= PAPER_L2
+
+
 def corrected(evidence: Evidence, found: Fit) -> Fit:
     """A fit to whole paths minus its bias; the standard errors are those of the fit.
 
@@ -69,7 +90,7 @@ def corrected(evidence: Evidence, found: Fit) -> Fit:
         RewardError: The fit is not at a maximum of the likelihood, or its bias exceeds a standard error. Then the
             demonstrations are too few for a correction to first order.
     """
-    if found.prior is not None or found.l2 > PAPER_L2 or found.status in {Status.STOPPED_EARLY, Status.INFINITE}:
+    if not _is_plain(found):
         raise RewardError(
             "`correct_bias`: the bias is known only at a maximum of the likelihood, without `prior` or a larger `l2`"
         )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
+from statistics import NormalDist
 
 import numpy as np
 
@@ -30,6 +31,10 @@ class Bootstrap(ByContent):
     failed: int
     stopped_early: int
     seed: int
+    #: (k,) the fit's parameters.
+    estimate: FloatArray
+    #: (participants, k) fits without one participant each, for the acceleration; NaN where there is none.
+    without_one: FloatArray
 
     @property
     def identified_draws(self) -> IntArray:
@@ -43,10 +48,42 @@ class Bootstrap(ByContent):
         return np.array([column.std(ddof=1) if len(column) > 1 else np.nan for column in columns])
 
     def interval(self, level: float = 0.95) -> FloatArray:
-        """(2, k) percentile interval over the replicates that identify the parameter; NaN where fewer than two do."""
-        ends = 50 * (1 - level), 50 * (1 + level)
+        """(2, k) BCa interval over the replicates that identify the parameter; NaN where fewer than two do.
+
+        Percentiles, corrected for the bias and the acceleration of the estimate (Efron 1987, J. Am. Stat. Assoc.
+        82:171).
+        """
         columns = [column[np.isfinite(column)] for column in self.theta.T]
-        return np.array([np.percentile(c, ends) if len(c) > 1 else (np.nan, np.nan) for c in columns]).T
+        found = [
+            np.percentile(column, _shares(column, value, _acceleration(own), level))
+            if len(column) > 1
+            else [np.nan] * 2
+            for column, value, own in zip(columns, self.estimate, self.without_one.T, strict=True)
+        ]
+        return np.array(found).T
+
+
+def _shares(column: FloatArray, estimate: float, acceleration: float, level: float) -> FloatArray:
+    """(2,) percentages of the replicates below the ends of a BCa interval."""
+    normal = NormalDist()
+    below = float(np.mean(column < estimate) + np.mean(column == estimate) / 2)
+    shift = normal.inv_cdf(min(max(below, 0.5 / len(column)), 1 - 0.5 / len(column)))
+    ends = []
+    for share in (0.5 - level / 2, 0.5 + level / 2):
+        moved = shift + normal.inv_cdf(share)
+        # A denominator at or below zero is beyond every replicate.
+        tilt = 1 - acceleration * moved
+        ends.append(100 * normal.cdf(shift + moved / tilt) if tilt > 0 else 100.0 * (moved > 0))
+    return np.array(ends)
+
+
+def _acceleration(without_one: FloatArray) -> float:
+    """Skewness of the estimate by the fits without one participant each; 0 where one of them is missing."""
+    away = without_one.mean() - without_one
+    size = float((away**2).sum())
+    if not np.isfinite(size) or size == 0:
+        return 0.0
+    return float((away**3).sum() / (6 * size**1.5))
 
 
 def bootstrap(
@@ -84,17 +121,31 @@ def bootstrap(
         results.extend(batch)
         if progress is not None:
             progress(len(results), "")
+    alone = [
+        result
+        for batch in map_in_order(partial(_refit, evidence, found), np.array_split(1 - member, len(member)), executor)
+        for result in batch
+    ]
     fits = [result for result in results if result is not None]
     if len(fits) < 2:
         raise DemonstrationError(
             f"`bootstrap`: fewer than two of {count} draws of participants gave a fit; add demonstrations"
         )
     return Bootstrap(
-        theta=np.array([np.where(again.identified, again.reward.theta, np.nan) for again in fits]),
+        theta=np.array([_theta(again, len(found.reward.theta)) for again in fits]),
         failed=count - len(fits),
         stopped_early=sum(again.status in {Status.STOPPED_EARLY, Status.INFINITE} for again in fits),
         seed=seed,
+        estimate=np.array(found.reward.theta),
+        without_one=np.array([_theta(again, len(found.reward.theta)) for again in alone]),
     )
+
+
+def _theta(again: Fit | None, count: int) -> FloatArray:
+    """(count,) parameters of a fit, NaN where they are not identified."""
+    if again is None:
+        return np.full(count, np.nan)
+    return np.where(again.identified, again.reward.theta, np.nan)
 
 
 def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
@@ -108,7 +159,7 @@ def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
                 found.l2,
                 prior=found.prior,
                 method=found.method,
-                restarts=False,
+                scan=False,
             )
         except (InfinitePartitionError, DemonstrationError):
             results.append(None)

@@ -1,6 +1,6 @@
 """Maximum-entropy inverse reinforcement learning: the parameters under which the demonstrations are most likely."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -17,6 +17,7 @@ from navirl_cli.irl.newton import Maximum, Point, maximise
 from navirl_cli.irl.objective import Objective
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.scan import Scan
 from navirl_cli.irl.status import Status
 
 #: The paper's small regulariser: its code subtracts 0.001 theta per gradient step, in cell units.
@@ -99,7 +100,7 @@ def fit(
     prior: Prior | None = None,
     method: Method = Method.NEWTON,
     fixed: Collection[str] = (),
-    restarts: bool = True,
+    scan: bool = True,
     progress: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Maximise log-likelihood - l2/2 sum_j (theta_j / scale_j)^2 + log prior density.
@@ -110,9 +111,10 @@ def fit(
         l2: Weight of the regulariser, nats per squared scale (the scales: 10 /m for c0, 1 for the others); it acts on
             the parameters that the prior does not contain.
         prior: Gaussian prior, in the parameters' units.
-        method: Trust-region Newton from two starts, or the study's gradient ascent from one.
+        method: Trust-region Newton, or the study's gradient ascent.
         fixed: Names of parameters that keep their initial values.
-        restarts: Whether Newton's method tries the parameters' other starts too.
+        scan: Whether Newton's method looks for other maxima along the profiles of the parameters that enter
+            non-linearly.
         progress: Called with the number of accepted steps so far and the objective.
 
     Returns:
@@ -122,19 +124,19 @@ def fit(
         InfinitePartitionError: The partition function is infinite at the initial parameters.
         RewardError: l2 is negative, the prior is of other parameters, or a fixed parameter is unknown.
     """
-    objective = _objective(evidence, initial, l2, prior)
+    objective = Objective.of(evidence, initial, l2, prior)
     first = objective(objective.to_units(initial.theta))
     if not np.isfinite(first.value):
         log_likelihood(evidence, initial)  # raises with the reason
-    others = [objective(x) for x in objective.starts(first)] if restarts and method is Method.NEWTON else []
-    starts = [first, *(point for point in others if np.isfinite(point.value))]
     names = [parameter.name for parameter in initial.parameters]
     for name in fixed:
         if name not in names:
             raise RewardError(unknown("fixed parameter", name, names))
     held = np.array([name in fixed for name in names])
-    # A parameter may change the likelihood from one start only: a distant person matters for a small sigma_p alone.
-    influential = np.any([objective.identified(start) for start in starts], axis=0)
+    influential = objective.identified(first)
+    if scan and not influential.all():
+        # A distant person matters for a small sigma_p alone.
+        influential = np.any([influential, *map(objective.identified, objective.scan_ends(first))], axis=0)
     steps = 0
 
     def count(value: float) -> None:
@@ -143,21 +145,12 @@ def fit(
         if progress is not None:
             progress(steps, value)
 
-    search = _by_adam if method is Method.ADAM else _by_newton
-    found = search(objective, starts, influential & ~held, count)
+    free = influential & ~held
+    if method is Method.ADAM:
+        found = _by_adam(objective, first, free, count)
+    else:
+        found = _by_newton(objective, first, free, scan, count)
     return _as_fit(objective, found, first, influential, held, (method, l2, prior))
-
-
-def _objective(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> Objective:
-    """The objective of a fit."""
-    regulariser = Prior.l2(initial.parameters, l2)
-    if prior is None:
-        return Objective(evidence, initial, regulariser, regulariser)
-    if len(prior.shift) != len(initial.theta):
-        names = ", ".join(parameter.name for parameter in initial.parameters)
-        raise RewardError(f"`prior`: expected one of {names}, found one of {len(prior.shift)} parameters")
-    regulariser = regulariser.where(~prior.known)
-    return Objective(evidence, initial, regulariser + prior, regulariser)
 
 
 def _as_fit(
@@ -215,30 +208,20 @@ def _as_fit(
 
 
 def _by_newton(
-    objective: Objective, starts: Sequence[Point], free: NDArray[np.bool_], count: Callable[[float], None]
+    objective: Objective, first: Point, free: NDArray[np.bool_], scan: bool, count: Callable[[float], None]
 ) -> Maximum:
-    """The highest maximum found from the starts."""
-    found: list[Maximum] = []
-    for start in starts:
-        # Parameters that the data do not identify keep their initial values: the regulariser alone would move them.
-        x = np.where(free, start.x, starts[0].x)
-        begin = start if (x == start.x).all() else objective(x)
-        if np.isfinite(begin.value):
-            tops = [maximum.best for maximum in found if maximum.converged]
-            climb = maximise(objective, begin, objective.bounds, free, count, tops)
-            if any(climb.best.value > top.value for top in tops) and not climb.converged:
-                climb = maximise(objective, climb.best, objective.bounds, free, count)  # to another maximum
-            found.append(climb)
+    """The highest maximum found from the start and along the profiles of the parameters that enter non-linearly."""
+    search = Scan(objective, objective.bounds, free, count, [maximise(objective, first, objective.bounds, free, count)])
+    if scan:
+        search.over([(j, values) for j, values in objective.scans() if free[j]])
     # Of maxima that differ by rounding only, take that of the given start.
-    top = max(maximum.best.value for maximum in found)
-    return next(maximum for maximum in found if maximum.best.value >= top - 1e-9)
+    top = search.top.value
+    return next(maximum for maximum in search.found if maximum.best.value >= top - 1e-9)
 
 
-def _by_adam(
-    objective: Objective, starts: Sequence[Point], free: NDArray[np.bool_], count: Callable[[float], None]
-) -> Maximum:
-    """Where the study's gradient ascent ends from the first start."""
-    places, values, ended = ascend(objective.slope, starts[0].x, objective.bounds, free, count)
+def _by_adam(objective: Objective, first: Point, free: NDArray[np.bool_], count: Callable[[float], None]) -> Maximum:
+    """Where the study's gradient ascent ends."""
+    places, values, ended = ascend(objective.slope, first.x, objective.bounds, free, count)
     return Maximum(objective(places[-1]), ended, False, places, values)
 
 

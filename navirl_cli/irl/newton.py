@@ -18,7 +18,12 @@ MAX_ITERATIONS = 200
 GAIN_TOLERANCE = 1e-9
 #: Initial radius of the first search, and of the others, which soon test whether they converge to the same maximum.
 FIRST_RADIUS, AGAIN_RADIUS = 1.0, 4.0
-MAX_RADIUS = 16.0
+#: Largest radius: an ascent without end, as that of a_p with few data, reaches a bound in a few steps. A search is
+#: tested against known maxima with a step of the other radius.
+MAX_RADIUS, TEST_RADIUS = 1e4, 16.0
+#: In a search for a value of interest: promise at which it ends, nats, and its share of what is missing.
+#: Its initial radius, as a share of the length of its start.
+COARSE, HOPE, WIDE = 1e-3, 3.0, 0.25
 #: A search this many nats below a known maximum is tested for convergence to it. Its predicted end may differ from the
 #: maximum by so much in place (every variable, or nats) and by so much in value (nats).
 NEAR, PLACE, ALIKE, SAME = 50.0, 1.0, 0.02, 0.5
@@ -52,6 +57,16 @@ class Maximum:
     path_value: FloatArray
 
 
+@dataclass(frozen=True)
+class Effort:
+    """When a search ends."""
+
+    #: Largest number of steps.
+    most: int = MAX_ITERATIONS
+    #: A predicted gain below which it has converged, nats.
+    enough: float = GAIN_TOLERANCE
+
+
 def maximise(
     objective: Callable[[FloatArray], Point],
     start: Point,
@@ -59,6 +74,8 @@ def maximise(
     free: NDArray[np.bool_],
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
+    hope: float | None = None,
+    effort: Effort = Effort(),
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -69,20 +86,27 @@ def maximise(
         free: (k,) variables that may move.
         progress: Called with every accepted value.
         known: Maxima found before. The search ends early where it is converging to one of them.
+        hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
+            within a coarse tolerance.
+        effort: When the search ends.
 
     Returns:
         The maximum and the accepted places before it.
     """
     lower, upper = bounds
-    here, path, radius = start, [start], AGAIN_RADIUS if known else FIRST_RADIUS
+    here, path, radius = start, [start], FIRST_RADIUS if not known and hope is None else AGAIN_RADIUS
+    if hope is not None:
+        radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
-    while len(path) <= MAX_ITERATIONS and radius > MIN_RADIUS:
+    while len(path) <= effort.most and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
+            break
+        if hope is not None and _settled(here, hope, bounds, free):
             break
         step = _step(here, lower, upper, free, radius)
         promised = _promise(here, step)
         # A step limited by the region predicts a small gain because it is short, not because the maximum is near.
-        if promised < GAIN_TOLERANCE and np.linalg.norm(step) < 0.9 * radius:
+        if promised < effort.enough and np.linalg.norm(step) < 0.9 * radius:
             converged = True
             break
         # A variable that meets its bound is set to it exactly.
@@ -104,11 +128,39 @@ def maximise(
     return Maximum(here, converged, blocked, *path_arrays)
 
 
+def moved(
+    here: Point, j: int, step: float, bounds: tuple[FloatArray, FloatArray], others: NDArray[np.bool_]
+) -> FloatArray:
+    """Where the maximum over other variables is expected after a step of variable j, by the quadratic model here.
+
+    Args:
+        here: The maximum over the other variables at the present value of variable j.
+        j: Number of the variable.
+        step: Of that variable.
+        bounds: (k,) lower and upper ones.
+        others: (k,) variables that may move.
+    """
+    pulled = Point(here.x, here.value, here.gradient + here.hessian[:, j] * step, here.hessian)
+    x: FloatArray = here.x + _step(pulled, *bounds, others, AGAIN_RADIUS)
+    x[j] = here.x[j] + step
+    return x
+
+
+def _settled(here: Point, hope: float, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
+    """Whether a concave climb is near its end, or will end below a value: several times its promise does not reach it.
+
+    A self-concordant function gains at most -d - ln(1 - d) with d^2/2 the promise of Newton's step (Nesterov 2004,
+    Introductory Lectures on Convex Optimization, Thm. 4.1.11): less than three times the promise up to d = 0.83.
+    """
+    promised = _promise(here, _step(here, *bounds, free, MAX_RADIUS))
+    return promised < max(COARSE, (hope - here.value) / HOPE)
+
+
 def _bound_for(here: Point, top: Point, bounds: tuple[FloatArray, FloatArray], free: NDArray[np.bool_]) -> bool:
     """Whether a full step from here ends at a known maximum, by place and by value."""
     if here.value < top.value - NEAR:
         return False
-    step = _step(here, *bounds, free, MAX_RADIUS)
+    step = _step(here, *bounds, free, TEST_RADIUS)
     away = here.x + step - top.x
     apart = -0.5 * float(away @ top.hessian @ away)
     # In units or in nats: around a flat maximum, places far apart may have the same value.
@@ -157,8 +209,10 @@ def _region_step(gradient: FloatArray, hessian: FloatArray, radius: float) -> Fl
     slope = basis.T @ gradient
     steepest = float(curvature[-1])
     if steepest < 0:
-        step = -slope / curvature
-        if float(step @ step) <= radius**2:
+        with np.errstate(over="ignore"):  # a flat direction asks for an endless step, which the radius limits
+            step = -slope / curvature
+            length = float(step @ step)
+        if length <= radius**2:
             full: FloatArray = basis @ step
             return full
     # |p(shift)| falls from infinity to 0 as the shift grows above the largest curvature; 1/|p| is nearly linear in it.

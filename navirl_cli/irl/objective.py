@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.likelihood import likelihood, value_and_gradient
 from navirl_cli.irl.newton import Point
@@ -30,6 +31,22 @@ class Objective:
     evaluations: int = field(default=0, init=False)
     #: Scores by demonstration at every place where it was called.
     _scores: dict[bytes, FloatArray] = field(default_factory=dict, init=False)
+
+    @staticmethod
+    def of(evidence: Evidence, initial: Reward, l2: float, prior: Prior | None) -> "Objective":
+        """The objective of a fit; arguments as of :func:`navirl_cli.irl.fit.fit`.
+
+        Raises:
+            RewardError: l2 is negative, or the prior is of other parameters.
+        """
+        regulariser = Prior.l2(initial.parameters, l2)
+        if prior is None:
+            return Objective(evidence, initial, regulariser, regulariser)
+        if len(prior.shift) != len(initial.theta):
+            names = ", ".join(parameter.name for parameter in initial.parameters)
+            raise RewardError(f"`prior`: expected one of {names}, found one of {len(prior.shift)} parameters")
+        regulariser = regulariser.where(~prior.known)
+        return Objective(evidence, initial, regulariser + prior, regulariser)
 
     @property
     def scale(self) -> FloatArray:
@@ -104,14 +121,19 @@ class Objective:
         identified: NDArray[np.bool_] = (slope > NO_INFORMATION) | (curvature > NO_INFORMATION)
         return identified
 
-    def starts(self, first: Point) -> list[FloatArray]:
-        """The starts besides the first: from the restarts of the parameters that have restarts."""
-        starts = []
-        for number in range(max((len(parameter.restarts) for parameter in self.initial.parameters), default=0)):
-            x = first.x.copy()
-            for j, parameter in enumerate(self.initial.parameters):
-                if number < len(parameter.restarts):
-                    x[j] = parameter.restarts[number] / parameter.scale
-            if (x != first.x).any():
-                starts.append(x)
-        return starts
+    def scans(self) -> list[tuple[int, tuple[float, ...]]]:
+        """Numbers of the parameters that enter non-linearly, each with the values to scan, in units of its scale."""
+        return [
+            (j, tuple(value / one.scale for value in one.scan))
+            for j, one in enumerate(self.initial.parameters)
+            if one.scan
+        ]
+
+    def scan_ends(self, first: Point) -> list[Point]:
+        """The first place with a scanned parameter at the ends of its scan, where there is a policy."""
+        ends = [
+            self(np.where(np.arange(len(first.x)) == j, value, first.x))
+            for j, values in self.scans()
+            for value in (values[0], values[-1])
+        ]
+        return [point for point in ends if np.isfinite(point.value)]

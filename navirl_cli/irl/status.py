@@ -7,6 +7,7 @@ class Status(StrEnum):
     """How a fit ended."""
 
     CONVERGED = "converged"
+    OPEN_INTERVAL = "open interval"
     STOPPED_EARLY = "stopped early"
     ON_BOUND = "on bound"
     NOT_IDENTIFIED = "not identified"
@@ -20,6 +21,10 @@ class Status(StrEnum):
 
 _ADVICE = {
     Status.CONVERGED: "no step increases the likelihood further",
+    Status.OPEN_INTERVAL: (
+        "converged, but the demonstrations set no end to a parameter on one side: read its interval, not its value; "
+        "add demonstrations, or take an earlier reward as `prior`"
+    ),
     Status.STOPPED_EARLY: (
         "the likelihood still increases: these values are not the optimum, which may lie at infinity; "
         "add demonstrations, choose a larger `l2`, or continue with `init`"

@@ -12,9 +12,8 @@ from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import feature_sums, likelihood, log_likelihood
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import PAPER_TERMS, Reward
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.terms.step_length import StepLength
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.parallel import map_in_order
 
@@ -26,8 +25,10 @@ class Validation(ByContent):
     participants: tuple[str, ...]
     #: (p,) steps of each.
     steps: IntArray
-    #: By model (learnt, no person, shortest path, uniform): (p,) held-out log-likelihood, nats.
+    #: By model, the learnt one first and equally likely moves last: (p,) held-out log-likelihood, nats.
     log_likelihoods: dict[str, FloatArray]
+    #: By model: number of parameters.
+    sizes: dict[str, int]
     #: The learnt model's k parameters.
     parameters: tuple[Parameter, ...]
     #: (p, k) sums of dr/dtheta over the left-out steps: demonstrated, and expected from the fit to the others; and the
@@ -43,6 +44,11 @@ class Validation(ByContent):
     def per_step(self, model: str) -> float:
         """Held-out log-likelihood per step over all participants."""
         return float(self.log_likelihoods[model].sum() / self.steps.sum())
+
+    def gain(self, model: str) -> FloatArray:
+        """(p,) held-out log-likelihood per step of the learnt model minus that of another, by participant."""
+        learnt = next(iter(self.log_likelihoods.values()))
+        return np.asarray((learnt - self.log_likelihoods[model]) / self.steps)
 
     @property
     def mismatch(self) -> FloatArray:
@@ -74,8 +80,8 @@ def cross_validate(
 ) -> Validation:
     """Fit to all participants but one and compute the likelihood of that one's steps, for each participant in turn.
 
-    The reward is compared with simpler models: the same reward without the person, the cost of path length alone (the
-    shortest path with noise), and equally likely moves.
+    The reward is compared with the cost of path length alone (the shortest path with noise), path length and personal
+    space, the paper's reward where it is another, the same reward without the person, and equally likely moves.
 
     Args:
         evidence: Demonstrations of at least two participants.
@@ -92,8 +98,9 @@ def cross_validate(
         InfinitePartitionError: A learnt reward has no policy in a left-out scene.
     """
     names = evidence.several_people("cross_validate")
+    models = _models(initial)
     results = []
-    for result in map_in_order(partial(_leave_out, evidence, _models(initial), l2), names, executor):
+    for result in map_in_order(partial(_leave_out, evidence, models, l2), names, executor):
         results.append(result)
         if progress is not None:
             progress(len(results), names[len(results) - 1])
@@ -103,6 +110,7 @@ def cross_validate(
         log_likelihoods={
             model: np.array([one.log_likelihoods[model] for one in results]) for model in results[0].log_likelihoods
         },
+        sizes={**{model: len(reward.theta) for model, reward in models.items()}, "uniform": 0},
         parameters=initial.parameters,
         demonstrated=np.array([one.demonstrated for one in results]),
         expected=np.array([one.expected for one in results]),
@@ -113,30 +121,33 @@ def cross_validate(
 
 
 def _models(initial: Reward) -> dict[str, Reward]:
-    """The reward and the models it is compared with, by name; the first is the reward."""
-    return {
-        "learnt": initial,
-        "no person": _with(initial, lambda term: not term.about_people),
-        "shortest path": _with(initial, lambda term: isinstance(term, StepLength)),
+    """The reward and the models it is compared with, by name; the first is the reward. No two have the same terms."""
+    step, _, space = PAPER_TERMS
+    without = tuple(term for term in initial.terms if not term.about_people)
+    wanted = {
+        "learnt": initial.terms,
+        "paper": PAPER_TERMS,
+        "length + personal space": (step, space),
+        "no person": without,
+        "length only": (step,),
     }
+    models: dict[str, Reward] = {}
+    for name, terms in wanted.items():
+        if terms and all(terms != other.terms for other in models.values()):
+            models[name] = _started(initial, terms)
+    return models
 
 
-def _with(initial: Reward, keep: Callable[[Term], bool]) -> Reward:
-    """The reward with some of its terms."""
-    theta: list[float] = []
-    at = 0
-    for term in initial.terms:
-        count = len(term.parameters)
-        if keep(term):
-            theta.extend(initial.theta[at : at + count])
-        at += count
-    return Reward(tuple(theta), tuple(term for term in initial.terms if keep(term)))
+def _started(initial: Reward, terms: tuple[Term, ...]) -> Reward:
+    """A reward of some terms that starts at the initial values of the terms that it shares with another."""
+    names = {parameter.name for term in initial.terms if term in terms for parameter in term.parameters}
+    values = {p.name: value for p, value in zip(initial.parameters, initial.theta, strict=True) if p.name in names}
+    return Reward.named(values, terms)
 
 
 def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: str) -> _LeftOut:
     """Fit every model without one participant and evaluate it on that participant."""
-    others = np.array([participant != name for participant in evidence.participants], dtype=int)
-    learning, held_out = evidence.repeated(others), evidence.repeated(1 - others)
+    learning, held_out = evidence.apart(name)
     fits = {model: fit(learning, initial, l2) for model, initial in models.items()}
     values = {model: log_likelihood(held_out, found.reward) for model, found in fits.items()}
     values["uniform"] = held_out.uniform_log_likelihood()

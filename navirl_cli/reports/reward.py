@@ -17,12 +17,13 @@ from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Rank
-from navirl_cli.irl.reward import PAPER_TERMS
 from navirl_cli.reports.evaluation import group_table, uniform_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
     correlation_table,
+    formula,
+    interval_notes,
     likelihood_table,
     meanings_of_parameters,
     parameter_table,
@@ -33,10 +34,6 @@ from navirl_cli.reports.fit import (
 )
 from navirl_cli.reports.repeated import repeated
 
-_FORMULA = (
-    "The reward of a step from s to s' is `c0 |s - s'| + a_g d(s)^2 + sum_p a_p exp(-sigma_p |s - s_p|^2)`. The sum is "
-    "over people p at the positions s_p; d is the distance from the nominal path."
-)
 _CAPTIONS = {
     "paths": "Driven paths by condition; the line is thicker where the person pushed.",
     "policy": "Expected visits of every cell under the learnt policy, and the reward of every cell.",
@@ -76,16 +73,16 @@ def report_of(
         Paragraph(_summary(demonstrations, learnt, content)),
         *_warnings(content, ranks),
         Heading("Parameters"),
-        *([Paragraph(_FORMULA)] if learnt.reward.terms == PAPER_TERMS else []),
+        formula(learnt.reward.terms),
         parameter_table(content),
+        *interval_notes(content),
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
         *_pictures(figures, "profile"),
         *correlation_table(content),
         likelihood_table(content),
-        Heading("Meaning of the parameters in metres"),
-        Bullets(tuple(map(_sentence, _in_metres(demonstrations, learnt, seed)))),
+        *_meanings(demonstrations, learnt, seed),
         Heading("Learnt policy"),
         *_pictures(figures, "policy"),
         Heading("Path metrics"),
@@ -115,18 +112,35 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
     )
 
 
+def _meanings(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Block]:
+    """The parameters in metres; nothing for a reward without parameters that have such a meaning."""
+    lines = tuple(map(_sentence, _in_metres(demonstrations, learnt, seed)))
+    return [Heading("Meaning of the parameters in metres"), Bullets(lines)] if lines else []
+
+
 def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:
     """The meaning of the reward at the mean distance of passing."""
     seen = [center_distance_m(one.xy_m, one.people_m) for one in demonstrations if one.id in learnt.demonstrations]
     seen = [distance for distance in seen if isfinite(distance)]
     passed = float(np.mean(seen)) if seen else float("nan")
-    return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, np.random.default_rng(seed))
+    front = learnt.intervals[0] if learnt.intervals else None
+    rng = np.random.default_rng(seed)
+    return meanings(learnt.reward, learnt.covariance, learnt.resolution_m, passed, rng, front)
 
 
 def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
-    interval = f" ({one.lower:.3g} to {one.upper:.3g})" if isfinite(one.lower) else ""
+    interval = ""
+    if isfinite(one.lower) or isfinite(one.upper):
+        interval = f" ({_range(one.lower, one.upper)})"
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
+
+
+def _range(lower: float, upper: float) -> str:
+    """An interval in words; an open end is infinite."""
+    if not isfinite(lower):
+        return f"less than {upper:.3g}"
+    return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
 
 
 def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:

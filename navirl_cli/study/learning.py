@@ -11,9 +11,12 @@ from navirl_cli.errors import NavirlError
 from navirl_cli.evaluation.compare import LEARNT, ON_GRID, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics
+from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Fit, fit
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.intervals import Intervals
+from navirl_cli.irl.reward import PAPER_TERMS, Reward
+from navirl_cli.irl.terms.term import Term
 
 FIRST, SECOND = 1, 2
 
@@ -35,6 +38,8 @@ class CycleFit:
     fit: Fit
     #: Its policy's paths beside those of the second cycle; None where there is none.
     near: Closeness | None
+    #: Of the parameters, by participant first where there are several.
+    intervals: tuple[Intervals, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,8 @@ class Job:
     samples: int
     #: Seed of the sampled paths.
     seed: tuple[int, ...]
+    #: Of the reward.
+    terms: tuple[Term, ...] = PAPER_TERMS
 
     def of_cycle(self, cycle: int) -> list[Demonstration]:
         """The demonstrations of one force cycle."""
@@ -78,30 +85,32 @@ def people_of(demonstrations: Sequence[Demonstration]) -> list[str]:
     )
 
 
-def jobs_of(demonstrations: Sequence[Demonstration], samples: int, seed: int) -> list[Job]:
+def jobs_of(
+    demonstrations: Sequence[Demonstration], samples: int, seed: int, terms: tuple[Term, ...] = PAPER_TERMS
+) -> list[Job]:
     """One job a participant, and last one for the second cycles of all."""
     taught = [one for one in demonstrations if is_of_cycle(one, FIRST) or is_of_cycle(one, SECOND)]
     people = people_of(taught)
     own = [
-        Job(name, tuple(one for one in taught if one.participant == name), samples, (seed, number))
+        Job(name, tuple(one for one in taught if one.participant == name), samples, (seed, number), terms)
         for number, name in enumerate(people)
     ]
     seconds = tuple(one for one in taught if is_of_cycle(one, SECOND))
-    return [*own, Job(None, seconds, samples, (seed, len(people)))]
+    return [*own, Job(None, seconds, samples, (seed, len(people)), terms)]
 
 
 def learn(job: Job) -> Learnt:
-    """Fit the first cycle from the study's initial parameters, the second warm-started from it, and compare paths."""
+    """Fit the first cycle from the initial parameters, the second warm-started from it, and compare paths."""
     rng = np.random.default_rng(job.seed)
     seconds = job.of_cycle(SECOND)
-    reward = Reward.named({})
+    reward = Reward.named({}, job.terms)
     found: dict[int, CycleFit] = {}
     problems = []
     for cycle in (FIRST, SECOND):
         shown = job.of_cycle(cycle)
         try:
             if shown:
-                found[cycle] = CycleFit(fit(evidence_of(shown), reward), None)
+                found[cycle] = _cycle_fit(shown, reward)
                 reward = found[cycle].fit.reward
             if shown and seconds:
                 near = closeness(reward, seconds, job.samples, rng)
@@ -109,6 +118,13 @@ def learn(job: Job) -> Learnt:
         except NavirlError as error:
             problems.append(f"{job.participant or 'all'}, cycle {cycle}: {error}")
     return Learnt(job.participant, found.get(FIRST), found.get(SECOND), tuple(problems))
+
+
+def _cycle_fit(shown: Sequence[Demonstration], start: Reward) -> CycleFit:
+    """The fit of some demonstrations with its intervals."""
+    evidence = evidence_of(shown)
+    found, analyses, _ = answers(evidence, fit(evidence, start), Questions())
+    return CycleFit(found, None, analyses.intervals)
 
 
 def closeness(

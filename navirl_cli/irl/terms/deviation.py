@@ -11,6 +11,10 @@ from navirl_cli.irl.terms.term import Jet, Parameter
 class Deviation:
     """Each step costs the squared distance of its cell to the nominal path."""
 
+    name = "deviation"
+    formula = "a_g d(s)^2"
+    symbols = ("d is the distance from the nominal path.",)
+
     parameters = (
         Parameter(
             "a_g",
@@ -20,10 +24,10 @@ class Deviation:
             scale=1.0,
             initial=-0.01,
             meaning="reward per step and squared metre from the nominal path",
-            restarts=(-1.0,),  # from the study's start alone, Newton's method stops at 0 on some of its data
         ),
     )
     about_people = False
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivative by cell."""

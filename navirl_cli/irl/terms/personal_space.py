@@ -6,12 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.irl.scene import Scene
-from navirl_cli.irl.terms.term import Jet, Parameter
+from navirl_cli.irl.terms.term import Jet, Parameter, geometric
 
 
 @dataclass(frozen=True)
 class PersonalSpace:
     """Each step near people has a cost; the costs of several people add up."""
+
+    name = "personal-space"
+    formula = "sum_p a_p exp(-sigma_p |s - s_p|^2)"
+    symbols = ("The sum is over people p at the positions s_p.",)
 
     parameters = (
         Parameter(
@@ -25,10 +29,11 @@ class PersonalSpace:
             scale=1.0,
             initial=2.0,
             meaning="decay of the personal space with squared distance",
-            restarts=(8.0,),  # a narrow space; wide ones are found from the study's start
+            scan=geometric(1e-3, 1e3, 15),
         ),
     )
     about_people = True
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives by cell."""

@@ -23,16 +23,24 @@ class Parameter:
     #: Initial value of a fit by default (the study's initial values).
     initial: float
     meaning: str
-    #: Further initial values of a fit: the likelihood may have several maxima in this parameter.
-    restarts: tuple[float, ...] = ()
+    #: Values between the bounds, ascending, at which a fit holds this parameter and looks for other maxima. Empty where
+    #: the parameter enters linearly: given all scanned parameters, the reward is linear in the others, and so the
+    #: log-likelihood is concave in them.
+    scan: tuple[float, ...] = ()
+
+
+def geometric(low: float, high: float, count: int) -> tuple[float, ...]:
+    """Values from low to high whose ratios are equal."""
+    return tuple(low * (high / low) ** (number / (count - 1)) for number in range(count))
 
 
 @dataclass(frozen=True, eq=False)
 class Jet:
     """Value and derivatives of a term on a scene.
 
-    Every array broadcasts to (n, 8), states by moves: (n, 1) for what depends on the cell that is left, (1, 8) for what
-    depends on the move alone.
+    Every array broadcasts to (n, 8), cells by moves: (n, 1) for what depends on the cell that is left, (1, 8) for what
+    depends on the move alone. Arrays of terms about turns broadcast to (n, 9, 8): cells, incoming moves (the last one
+    for paths that begin in the cell), moves.
     """
 
     value: FloatArray
@@ -46,12 +54,28 @@ class Term(Protocol):
     """A term of the reward: a frozen dataclass, so that equal terms compare equal."""
 
     @property
+    def name(self) -> str:
+        """Its name on the command line and in files: lower-case letters, digits and hyphens."""
+
+    @property
+    def formula(self) -> str:
+        """Its value for a step from s to s', as the report prints it."""
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Sentences on what its formula contains besides its parameters, s and s'."""
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The term's parameters in order. No two terms share a name."""
 
     @property
     def about_people(self) -> bool:
         """Whether it depends on people; a model without people leaves it out."""
+
+    @property
+    def about_turns(self) -> bool:
+        """Whether it depends on the move before, so that states are cells by incoming move."""
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives with respect to the term's parameters, in reward per step."""
