@@ -23,7 +23,7 @@ def least(words, command):
             given.append("none.json")
         elif param.required:
             ending = param.type.endings[0] if isinstance(param.type, OutputPath) else ""
-            given += [param.opts[0], f"none{ending}"]
+            given += [param.opts[0], param.type.choices[0] if isinstance(param.type, Choice) else f"none{ending}"]
     return [*given, *(("--group", "a", "--group", "b") if words == ("plot", "compare") else ())]
 
 

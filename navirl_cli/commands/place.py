@@ -55,6 +55,11 @@ class Place:
         if self.log is None and self.at is not None:
             raise click.UsageError("--at goes with --log.")
 
+    @property
+    def names_scene(self) -> bool:
+        """Whether any option names a scene."""
+        return any(one is not None for one in (self.scene, self.log, self.map_file, self.start, self.goal))
+
     def files(self) -> list[Path]:
         """The files that it names."""
         return [one for one in (self.log, self.map_file, self._demos_and_trial[0]) if one is not None]
@@ -93,7 +98,7 @@ class Place:
         goal = self.goal or seen.goal_m
         if goal is None:
             raise LogError(f"{log}: announces no goal until then; name one with `goal`")
-        radius_m = self._radius_m(recording.session.robot_radius_m)
+        radius_m = self.radius_m(recording.session.robot_radius_m)
         grid = grid_for(recording.occupancy, radius_m, learnt.resolution_m)
         (x, y), yaw = (seen.pose_m, seen.yaw_rad) if self.start is None else _pose(self.start)
         return problem_on(grid, (x, y), goal, self.people or seen.people_m, radius_m, start_yaw_rad=yaw)
@@ -104,12 +109,12 @@ class Place:
         from navirl_cli.logs.map_file import read_map
         from navirl_cli.planning.problem import grid_for, problem_on
 
-        radius_m = self._radius_m(None)
+        radius_m = self.radius_m(None)
         grid = grid_for(read_map(map_file), radius_m, learnt.resolution_m)
         point, yaw = _pose(start)
         return problem_on(grid, point, goal, self.people, radius_m, start_yaw_rad=yaw)
 
-    def _radius_m(self, declared_m: float | None) -> float:
+    def radius_m(self, declared_m: float | None) -> float:
         """Radius of the robot: the user's, the log's, or the one that extract assumes."""
         return next(one for one in (self.robot_radius, declared_m, ROBOT_RADIUS_M) if one is not None)
 
