@@ -29,8 +29,8 @@ def work(tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluate")
     for words in (
         ["extract", *LOGS, "-o", folder / "demos.json"],
-        ["fit", folder / "demos.json", "--cycle", 2, "-o", folder / "learnt.json"],
-        ["fit", folder / "demos.json", "--cycle", 1, "-o", folder / "first.json"],
+        ["fit", folder / "demos.json", "--cycle", 2, "--intervals", "wald", "-o", folder / "learnt.json"],
+        ["fit", folder / "demos.json", "--cycle", 1, "--intervals", "wald", "-o", folder / "first.json"],
     ):
         assert CliRunner().invoke(cli, [str(word) for word in words]).exit_code == 0
     return folder
