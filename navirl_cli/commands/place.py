@@ -1,6 +1,6 @@
 """Where to plan: the options of the section Scene, and the planning problem that they name."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from navirl_cli.artefacts.rewards import LearntReward, check_cells
 from navirl_cli.commands.shared import demonstrations_in
 from navirl_cli.commands.types import FilePath, Number, Point, Pose
 from navirl_cli.commands.usage import section
+from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import ROBOT_RADIUS_M
 from navirl_cli.errors import ArtefactError, LogError, unknown
 
@@ -70,14 +71,25 @@ class Place:
         Raises:
             NavirlError: A file cannot be read, or the scene is impossible.
         """
+        from navirl_cli.planning.problem import problem_of
+
         path, trial = self._demos_and_trial
         if path is not None:
-            return _of_demonstration(learnt, path, trial)
+            return problem_of(_demonstration(learnt, path, trial))
         if self.log is not None:
             return self._of_log(learnt, self.log)
         if self.map_file is None or self.start is None or self.goal is None:
             raise click.UsageError("Name the scene: --scene, --log, or --map with --start and --goal.")
         return self._on_map(learnt, self.map_file, self.start, self.goal)
+
+    def demonstration(self, learnt: LearntReward) -> Demonstration | None:
+        """The demonstration whose scene it is; None for another scene.
+
+        Raises:
+            NavirlError: As in :meth:`problem`.
+        """
+        path, trial = self._demos_and_trial
+        return None if path is None else _demonstration(learnt, path, trial)
 
     @property
     def _demos_and_trial(self) -> tuple[Path | None, str]:
@@ -101,7 +113,8 @@ class Place:
         radius_m = self.radius_m(recording.session.robot_radius_m)
         grid = grid_for(recording.occupancy, radius_m, learnt.resolution_m)
         (x, y), yaw = (seen.pose_m, seen.yaw_rad) if self.start is None else _pose(self.start)
-        return problem_on(grid, (x, y), goal, self.people or seen.people_m, radius_m, start_yaw_rad=yaw)
+        problem = problem_on(grid, (x, y), goal, self.people or seen.people_m, radius_m, start_yaw_rad=yaw)
+        return replace(problem, t_ns=seen.t_ns)
 
     def _on_map(
         self, learnt: LearntReward, map_file: Path, start: tuple[float, ...], goal: tuple[float, float]
@@ -119,17 +132,15 @@ class Place:
         return next(one for one in (self.robot_radius, declared_m, ROBOT_RADIUS_M) if one is not None)
 
 
-def _of_demonstration(learnt: LearntReward, path: Path, trial: str) -> "Problem":
-    """The problem of a trial in a file, or of its first one."""
-    from navirl_cli.planning.problem import problem_of
-
+def _demonstration(learnt: LearntReward, path: Path, trial: str) -> Demonstration:
+    """A trial in a file, or its first one."""
     demonstrations = demonstrations_in(path)
     known = {one.id: one for one in demonstrations}
     if trial and trial not in known:
         raise ArtefactError(f"{path}: {unknown('trial', trial, known)}")
     one = known[trial] if trial else demonstrations[0]
     check_cells(learnt, [one], str(path))
-    return problem_of(one)
+    return one
 
 
 def _pose(start: tuple[float, ...]) -> tuple[tuple[float, float], float | None]:
