@@ -16,7 +16,11 @@ WRONG = {Choice: "nonsense", Count: "-1000000", Number: "nan", OutputPath: "x.do
 
 
 #: What commands need besides, which depends on their other options.
-NEEDED = {("plot", "compare"): ("--group", "a", "--group", "b"), ("export",): ("-o", "none")}
+NEEDED = {
+    ("plot", "compare"): ("--group", "a", "--group", "b"),
+    ("export",): ("-o", "none"),
+    ("view",): ("--scene", "none.json", "-o", "none.rrd"),
+}
 
 
 def least(words, command):

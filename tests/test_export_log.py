@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from mcap.reader import make_reader
+from reward_files import write_reward
 
 from navirl_cli.cli import cli
 from navirl_cli.errors import LogError
@@ -162,17 +163,8 @@ def test_a_damaged_recording_gives_the_rest_and_exit_code_3(tmp_path):
     broken = tmp_path / "broken.mcap"
     broken.write_bytes(LOG.read_bytes()[:-200_000])
     words = ("--to", "mcap", "--scene", OLD / "demonstrations.json", "--with", broken, "-o", tmp_path / "x.mcap")
-    assert "broken.mcap: bytes " in run("export", reward_file(tmp_path), *words, code=3)
+    assert "broken.mcap: bytes " in run("export", write_reward(tmp_path / "reward.json", PAPER.theta), *words, code=3)
     assert len(raw_messages(tmp_path / "x.mcap")) > 1000
-
-
-def reward_file(folder, theta=PAPER.theta):
-    content = json.loads((OLD / "reward.json").read_text())
-    for parameter, value in zip(content["parameters"], theta, strict=True):
-        parameter["value"] = value
-    path = folder / "reward.json"
-    path.write_text(json.dumps(content))
-    return path
 
 
 def test_the_table_gives_the_published_numbers_of_the_public_code():
@@ -198,7 +190,7 @@ def test_the_table_of_other_terms_says_what_is_missing(names, note):
 
 
 def test_the_table_is_printed_and_written(tmp_path):
-    reward = reward_file(tmp_path)
+    reward = write_reward(tmp_path / "reward.json", PAPER.theta)
     assert "62.5 a_p / (c0 h)" in run("export", reward, "--to", "table", "-o", tmp_path / "t.csv")
     rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
     printed = json.loads(run("export", reward, "--to", "table", "--json"))["parameters"]

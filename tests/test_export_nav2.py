@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from reward_files import write_reward
 from ruamel.yaml import YAML
 
 from navirl_cli.cli import cli
@@ -203,23 +204,14 @@ OLD = Path(__file__).parent / "version1"
 DEMOS = OLD / "demonstrations.json"
 
 
-@pytest.fixture(scope="module")
-def reward_file(tmp_path_factory):
-    content = json.loads((OLD / "reward.json").read_text())
-    for parameter, value in zip(content["parameters"], PAPER.theta, strict=True):
-        parameter["value"] = value
-    path = tmp_path_factory.mktemp("export") / "reward.json"
-    path.write_text(json.dumps(content))
-    return path
-
-
 def run(*words, code=0):
     done = CliRunner().invoke(cli, [str(word) for word in words])
     assert done.exit_code == code, done.output
     return done.stdout if code == 0 else done.output
 
 
-def test_the_command_writes_a_folder_once(reward_file, tmp_path):
+def test_the_command_writes_a_folder_once(tmp_path):
+    reward_file = write_reward(tmp_path / "reward.json", PAPER.theta)
     words = ("export", reward_file, "--to", "nav2", "--scene", DEMOS, "-o", tmp_path / "nav2")
     printed = json.loads(run(*words, "--json"))
     assert printed["files"] == sorted(one.name for one in (tmp_path / "nav2").iterdir())
