@@ -16,7 +16,8 @@ from navirl_cli.commands import export as command
 from navirl_cli.export.costs import CostModel, Passing, mask_costs, matched, navfn, smac2d
 from navirl_cli.export.folder import FILES, write_nav2
 from navirl_cli.export.fragments import Distro
-from navirl_cli.export.nav2 import Field, Nav2Export, lost
+from navirl_cli.export.nav2 import Field, Nav2Export, lost, nav2_export
+from navirl_cli.export.readme import numbers
 from navirl_cli.irl.reward import Reward
 from navirl_cli.planning.recommendation import straight_passage
 
@@ -43,8 +44,7 @@ SERVERS = [
 
 
 def exported(folder, *, name="navfn", reward=PAPER, factor=None, **more):
-    passing = matched(name, reward, 0.1, 0.3, factor)
-    one = Nav2Export(passing, **{"distro": Distro.JAZZY, "robot_radius_m": 0.3, "problem": PASSAGE, **more})
+    one = nav2_export(reward, 0.1, 0.3, name, factor, **{"distro": Distro.JAZZY, "problem": PASSAGE, **more})
     write_nav2(folder, one)
     return one
 
@@ -74,7 +74,7 @@ def test_the_mask_holds_the_costs_to_half_a_percent(tmp_path, field):
     rows, columns = np.indices(grid.shape)
     x, y = grid.origin_m[0] + (columns + 0.5) * 0.1, grid.origin_m[1] + (rows + 0.5) * 0.1
     k = 62.5 / (54.1 * 0.1)
-    people = one.model.people_factor * k * 4.91 * np.exp(-1.68 * (x**2 + y**2))
+    people = one.mask_model.people_factor * k * 4.91 * np.exp(-1.68 * (x**2 + y**2))
     # the nominal path is the straight row of cells
     line = k * 0.87 * ((y - 0.0) ** 2 + np.maximum(np.abs(x) - 4.0, 0) ** 2)
     costs = {"people": people, "line": line, "both": people + line}[field.value]
@@ -88,13 +88,26 @@ def test_the_mask_holds_the_costs_to_half_a_percent(tmp_path, field):
 
 def test_planner_and_policy_pass_a_person_alike():
     for name in ("navfn", "smac2d"):
-        found = matched(name, PAPER, 0.1, 0.3)
+        found = matched(name, PAPER, 0.1, 0.3, line=True)
         assert found.planner_m == pytest.approx(found.policy_m, abs=0.1)
         assert found.model.people_factor > 1
-    assert matched("navfn", PAPER, 0.1, 0.3, 1.0).planner_m < 0
-    model = found.model
-    assert model.planner.multiplier > 1
-    assert model.amplitude <= 251
+        # without the cost off the line fewer costs suffice, and no path is nearer that does not lead through the person
+        alone = matched(name, PAPER, 0.1, 0.3, costs=found.model.planner)
+        assert alone.model.people_factor < 1
+        assert 0 < alone.planner_m < found.policy_m + 0.2
+        assert alone.model.planner is found.model.planner
+    assert matched("navfn", PAPER, 0.1, 0.3, 1.0, line=True).planner_m < 0
+    assert found.model.planner.multiplier > 1
+    assert found.model.amplitude <= 251
+
+
+def test_the_live_mask_has_the_costs_of_people_alone(tmp_path):
+    one = exported(tmp_path, field=Field.BOTH)
+    node = YAML(typ="safe").load(tmp_path / "people_mask.yaml")["people_mask"]["ros__parameters"]
+    assert node["amplitude"] == pytest.approx(one.model.amplitude, rel=1e-5)
+    assert one.model.amplitude < one.mask_model.amplitude
+    assert one.model.planner is one.mask_model.planner
+    assert [row[0] for row in numbers(one).rows] == ["people", "people and line"]
 
 
 def test_costs_go_through_the_mask_as_through_keepout_filter():
@@ -189,10 +202,14 @@ def test_the_node_passes_its_own_test_and_makes_the_same_mask(tmp_path):
 )
 def test_what_costs_cannot_hold_is_said(reward, planner, field, message):
     model = CostModel(reward, planner, 0.1)
-    lines = lost(Nav2Export(Passing(model, 0.5, 0.5), Distro.JAZZY, 0.3, PASSAGE, field))
+    passing = Passing(model, 0.5, 0.5)
+    beside = passing if field is Field.BOTH else None
+    lines = lost(Nav2Export(passing, Distro.JAZZY, 0.3, PASSAGE, field, beside_line=beside))
     assert message in lines[0]
     apart = lost(Nav2Export(Passing(CostModel(PAPER, navfn(), 0.1), 0.5, 0.1), Distro.JAZZY, 0.3))
-    assert apart == ["the planner passes a person on its line at 0.10 m, paths of the policy at 0.50 m"]
+    assert apart == [
+        "with costs of people the planner passes a person on its line at 0.10 m, paths of the policy at 0.50 m"
+    ]
 
 
 def test_the_words_of_the_command_are_those_of_the_export():
@@ -215,7 +232,7 @@ def test_the_command_writes_a_folder_once(tmp_path):
     words = ("export", reward_file, "--to", "nav2", "--scene", DEMOS, "-o", tmp_path / "nav2")
     printed = json.loads(run(*words, "--json"))
     assert printed["files"] == sorted(one.name for one in (tmp_path / "nav2").iterdir())
-    assert printed["amplitude"] > 0
+    assert printed["costs"][0]["amplitude"] > 0
     assert "replace them with --force" in run(*words, code=1)
     assert "navfn" in run(*words, "--force")
     for word in ("--mask", "both"), ("--slow", "30"):

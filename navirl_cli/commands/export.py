@@ -154,22 +154,28 @@ def _to_table(learnt: LearntReward, where: Place, output: Path | None, *, as_jso
 
 
 def _to_nav2(learnt: LearntReward, where: Place, own: dict[str, Any], output: Path, *, as_json: bool) -> None:
-    from navirl_cli.export.costs import matched
     from navirl_cli.export.folder import write_nav2
     from navirl_cli.export.fragments import Distro
-    from navirl_cli.export.nav2 import Field, Nav2Export, lost
+    from navirl_cli.export.nav2 import Field, lost, nav2_export
     from navirl_cli.export.readme import numbers
 
     problem = where.problem(learnt) if where.names_scene else None
-    radius_m = where.radius_m(None) if problem is None else problem.robot_radius_m
-    passing = matched(own["planner"] or "navfn", learnt.reward, learnt.resolution_m, radius_m, own["factor"])
-    distro, field = Distro(own["distro"] or "jazzy"), Field(own["mask"] or "people")
-    export = Nav2Export(passing, distro, radius_m, problem, field, own["slow"])
+    export = nav2_export(
+        learnt.reward,
+        learnt.resolution_m,
+        where.radius_m(None) if problem is None else problem.robot_radius_m,
+        own["planner"] or "navfn",
+        own["factor"],
+        distro=Distro(own["distro"] or "jazzy"),
+        problem=problem,
+        field=Field(own["mask"] or "people"),
+        slow_percent=own["slow"],
+    )
     files, losses = write_nav2(output, export), lost(export)
     if as_json:
-        echo_json({**numbers(passing).records()[0], "files": files, "lost": losses})
+        echo_json({"costs": numbers(export).records(), "files": files, "lost": losses})
     else:
-        echo(f"{written(numbers(passing), Format.TEXT)}\n\n{output}: {', '.join(files)}")
+        echo(f"{written(numbers(export), Format.TEXT)}\n\n{output}: {', '.join(files)}")
     for line in losses:
         say(line)
 

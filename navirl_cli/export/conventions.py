@@ -67,7 +67,15 @@ def _nav2(reward: Reward, h_m: float, radius_m: float) -> list[Row]:
         rows.append(("Nav2 NavFn", "line", float(line), "cost/m^2", "62.5 a_g / (c0 h)"))
     for name, title in (("navfn", "Nav2 NavFn"), ("smac2d", "Nav2 SmacPlanner2D")):
         model = matched(name, reward, h_m, radius_m).model
-        rows.append((title, "factor", model.people_factor, "1", "planner passes people as the policy does"))
+        rows.append(
+            (
+                title,
+                "factor",
+                model.people_factor,
+                "1",
+                "planner passes people as the policy does, by their costs alone",
+            )
+        )
         if name == "smac2d":
             rows.append((title, "multiplier", model.planner.multiplier, "1", "costs stay below 252"))
         rows.append((title, "scaled amplitude", model.amplitude, "cost", "factor x amplitude / multiplier"))

@@ -35,8 +35,8 @@ COST_PER_PERCENT, MOST_PERCENT = 2.54, 99
 MOST_MASK_COST: Final = 251
 #: Terms about people, one of which a reward needs, and the others that it may have.
 SPACES, LINE = frozenset({"personal-space", "length-space"}), frozenset({"length", "deviation"})
-#: Factors of the people's part that are tried, from the reward's own on.
-_FACTORS: Final = np.geomspace(1.0, 8.0, 43)
+#: Factors of the people's part that are tried.
+_FACTORS: Final = np.geomspace(0.25, 8.0, 61)
 #: Largest cost_travel_multiplier that is written.
 _MOST_MULTIPLIER: Final = 8.0
 
@@ -248,9 +248,19 @@ class Passing:
 
 
 def matched(
-    name: str, reward: Reward, resolution_m: float, robot_radius_m: float, factor: float | None = None
+    name: str,
+    reward: Reward,
+    resolution_m: float,
+    robot_radius_m: float,
+    factor: float | None = None,
+    *,
+    line: bool = False,
+    costs: PlannerCosts | None = None,
 ) -> Passing:
-    """Costs with which a planner passes a person as far away as paths of the policy do on average.
+    """Costs with which a planner passes a person as far away as paths of the policy do on average, or a little farther.
+
+    The person is no obstacle here: the costs alone keep the planner away. With the cost off the line it passes at any
+    distance; without, the path of least cost leads through the person or passes at a distance of its own.
 
     Args:
         name: "navfn" or "smac2d".
@@ -258,20 +268,25 @@ def matched(
         resolution_m: Of its cells, m.
         robot_radius_m: Of the robot, m.
         factor: Of the costs near people, in place of the one that matches best.
+        line: Whether the planner also pays for the distance from the nominal path.
+        costs: What the planner pays, if that is chosen already.
 
     Raises:
         RewardError: Costs cannot hold the reward, or it has no policy.
     """
     factors = _FACTORS.tolist() if factor is None else [factor]
-    models = [CostModel(reward, planner_for(name, reward, resolution_m, f), resolution_m, f) for f in factors]
+    models = [
+        CostModel(reward, costs or planner_for(name, reward, resolution_m, one), resolution_m, one) for one in factors
+    ]
     problem = straight_passage(robot_radius_m, resolution_m)
     wanted, _ = Planner(problem, reward).passing_m
-    found = [Passing(one, wanted, passing_m(one, problem)) for one in models]
-    return min(found, key=lambda one: abs(one.planner_m - wanted))
+    found = [Passing(one, wanted, passing_m(one, problem, line=line)) for one in models]
+    # a path past people before any that leads through them
+    return min(found, key=lambda one: (one.planner_m <= 0, abs(one.planner_m - wanted)))
 
 
-def passing_m(model: CostModel, problem: Problem) -> float:
+def passing_m(model: CostModel, problem: Problem, *, line: bool) -> float:
     """Least distance between shell and people of a planner's path in a scene, m."""
     scene = problem.scene
-    path = model.planner.path(scene, mask_costs(model.on(scene)))
+    path = model.planner.path(scene, mask_costs(model.on(scene, line=line)))
     return float(measured(problem, scene.lattice.xy_m[path]).min_distance_m[0])

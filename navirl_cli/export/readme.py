@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from navirl_cli import __version__
 from navirl_cli.documents.tables import Column, Format, Table, written
-from navirl_cli.export.costs import Passing
 from navirl_cli.export.fragments import Distro
 from navirl_cli.export.nav2 import Field, Nav2Export
 
@@ -31,29 +30,32 @@ def readme_text(export: Nav2Export, losses: Sequence[str]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def numbers(passing: Passing) -> Table:
-    """What was chosen, as one row."""
-    model = passing.model
-    multiplier = model.planner.multiplier if model.planner.planner == "smac2d" else None
+def numbers(export: Nav2Export) -> Table:
+    """What was chosen: a row for the costs of people alone, one for those beside the nominal line."""
     columns = (
+        Column("costs"),
         Column("planner"),
-        Column("cost_travel_multiplier", "cost_travel_multiplier", decimals=1),
+        Column("cost_travel_multiplier", decimals=1),
         Column("people_factor", "factor", decimals=2),
         Column("amplitude", decimals=1),
         Column("covariance_m2", "covariance m2", decimals=3),
         Column("planner_passes_m", "planner passes at m", decimals=2),
         Column("policy_passes_m", "policy passes at m", decimals=2),
     )
-    row = (
-        model.planner.planner,
-        multiplier,
-        model.people_factor,
-        max(model.amplitude, 0.0),
-        model.covariance_m2,
-        passing.planner_m,
-        passing.policy_m,
-    )
-    return Table(columns, (row,)).without_empty()
+    rows = [
+        (
+            what,
+            one.model.planner.planner,
+            one.model.planner.multiplier if one.model.planner.planner == "smac2d" else None,
+            one.model.people_factor,
+            max(one.model.amplitude, 0.0),
+            one.model.covariance_m2,
+            one.planner_m,
+            one.policy_m,
+        )
+        for what, one in export.passings
+    ]
+    return Table(columns, tuple(rows)).without_empty()
 
 
 def _head(export: Nav2Export) -> str:
@@ -63,12 +65,13 @@ def _head(export: Nav2Export) -> str:
 Written by navirl {__version__}. A person costs amplitude x exp(-d^2 / (2 covariance_m2)) at the distance d from the
 person's centre.
 
-{written(numbers(export.passing), Format.MARKDOWN)}
+{written(numbers(export), Format.MARKDOWN)}
 
-A planner drives the path of least cost. It passes people nearer than paths of the policy do, so the costs of people are
-multiplied by the factor. The last two columns are distances from the robot's shell to a person who stands on its
-straight line on open ground: the planner's, and the mean over paths of the policy. The robot's radius is
-{export.robot_radius_m:g} m.
+A planner drives the one path of least cost, while paths of the policy spread. So the costs of people are multiplied by
+the factor with which the planner passes a person as the policy does. The last two columns are distances from the
+robot's shell to a person who stands on its straight line on open ground: the planner's, and the mean over paths of the policy.
+The person is no obstacle there: the costs alone keep the planner away. The live mask holds people alone, and has the
+factor of that row. The robot's radius is {export.robot_radius_m:g} m.
 
 `planner.yaml`: merge it into your parameter file. The costs hold for this planner only. Theta*
 squares costs, MPPI averages them: neither has a mapping. With MPPI use CostCritic; ObstaclesCritic takes costs for
