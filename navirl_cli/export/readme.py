@@ -69,9 +69,9 @@ person's centre.
 
 A planner drives the one path of least cost, while paths of the policy spread. So the costs of people are multiplied by
 the factor with which the planner passes a person as the policy does. The last two columns are distances from the
-robot's shell to a person who stands on its straight line on open ground: the planner's, and the mean over paths of the policy.
-The person is no obstacle there: the costs alone keep the planner away. The live mask holds people alone, and has the
-factor of that row. The robot's radius is {export.robot_radius_m:g} m.
+robot's shell to a person who stands on its straight line on open ground: the planner's, and the mean over paths of the
+policy. The person is no obstacle there: the costs alone keep the planner away. The live mask holds people alone, and
+has the factor of that row. The robot's radius is {export.robot_radius_m:g} m.
 
 `planner.yaml`: merge it into your parameter file. The costs hold for this planner only. Theta*
 squares costs, MPPI averages them: neither has a mapping. With MPPI use CostCritic; ObstaclesCritic takes costs for
