@@ -206,6 +206,7 @@ def test_the_table_is_printed_and_written(tmp_path):
         (("nav2", "-o", "x", "--count", "3"), "--count goes with --to mcap"),
         (("table", "--scene", "d.json"), "--to table needs no scene"),
         (("nav2",), "--to nav2 needs -o"),
+        (("nav2", "-o", "x", "--person", "1,2"), "--person needs a scene"),
     ],
 )
 def test_words_that_exclude_each_other(words, message):

@@ -240,3 +240,9 @@ def test_the_command_writes_a_folder_once(tmp_path):
         )
     assert "found a file" in run("export", reward_file, "--to", "nav2", "-o", DEMOS, code=1)
     assert not (tmp_path / "new").exists()
+    (tmp_path / "nav2" / "README.md").write_text("mine")
+    run("export", reward_file, "--to", "nav2", "-o", tmp_path / "nav2", "--force")
+    assert (tmp_path / "nav2" / "mask.yaml").exists()  # of no export that it knows
+    within = ("--map", tmp_path / "nav2" / "mask.yaml", "--start", "0,0", "--goal", "1,0")
+    words = ("export", reward_file, "--to", "nav2", *within, "-o", tmp_path / "nav2", "--force")
+    assert "expected another file than the input" in run(*words, code=2)

@@ -108,7 +108,9 @@ def export(
     if output is not None and target != "nav2":
         check_output(output, inputs, force=force)
     elif output is not None:
-        refuse_inputs([output], inputs)
+        from navirl_cli.export.folder import FILES
+
+        refuse_inputs([output, *(output / name for name in FILES)], inputs)
         _check_folder(output, force=force)
     learnt = read_reward(reward)
     if output is None or target == "table":
@@ -125,8 +127,13 @@ def _check_words(target: str, own: dict[str, Any], where: Place, output: Path | 
         for name in names:
             if other != target and own[name] is not None:
                 raise click.UsageError(f"--{name} goes with --to {other}.")
-    needs = target == "mcap", own["mask"] is not None, own["slow"] is not None
-    for needed, name in zip(needs, ("--to mcap", "--mask", "--slow"), strict=True):
+    needs = {
+        "--to mcap": target == "mcap",
+        "--mask": own["mask"] is not None,
+        "--slow": own["slow"] is not None,
+        "--person": bool(where.people),
+    }
+    for name, needed in needs.items():
         if needed and not where.names_scene:
             raise click.UsageError(f"{name} needs a scene: --scene, --log, or --map with --start and --goal.")
     if target == "table" and where.names_scene:

@@ -36,7 +36,7 @@ MOST_MASK_COST: Final = 251
 #: Terms about people, one of which a reward needs, and the others that it may have.
 SPACES, LINE = frozenset({"personal-space", "length-space"}), frozenset({"length", "deviation"})
 #: Factors of the people's part that are tried.
-_FACTORS: Final = np.geomspace(0.25, 8.0, 61)
+_FACTORS: Final = np.geomspace(0.1, 8.0, 77)
 #: Largest cost_travel_multiplier that is written.
 _MOST_MULTIPLIER: Final = 8.0
 

@@ -10,7 +10,7 @@ from navirl_cli.export.costs import away_from_people_m
 from navirl_cli.export.fragments import Distro, yaml_text
 from navirl_cli.export.masks import occupancy_of, slowing, write_mask
 from navirl_cli.export.nav2 import Nav2Export, lost
-from navirl_cli.export.readme import readme_text
+from navirl_cli.export.readme import TITLE, readme_text
 from navirl_cli.files import swapped_folder
 from navirl_cli.planning.problem import Problem
 
@@ -27,7 +27,7 @@ _NEAR, _FAR = 0.5, 0.05
 
 
 def write_nav2(folder: Path, export: Nav2Export) -> list[str]:
-    """Write the folder; files of an older export are replaced.
+    """Write the folder; files of an older export are replaced or removed.
 
     Args:
         folder: Where; created if it does not exist.
@@ -40,15 +40,25 @@ def write_nav2(folder: Path, export: Nav2Export) -> list[str]:
         ArtefactError: It cannot be written.
     """
     texts = _texts(export)
+    older = _is_export(folder)
     with swapped_folder(folder) as new:
         for name, text in texts.items():
             (new / name).write_text(text, encoding="utf-8")
         if export.problem is not None:
             _write_masks(new, export, export.problem)
         names = sorted(one.name for one in new.iterdir())
-    for name in set(FILES) - set(names):
-        (folder / name).unlink(missing_ok=True)
+    if older:
+        for name in set(FILES) - set(names):
+            (folder / name).unlink(missing_ok=True)
     return names
+
+
+def _is_export(folder: Path) -> bool:
+    """Whether a folder holds an older export, whose files are not the user's own."""
+    try:
+        return (folder / "README.md").read_text(encoding="utf-8").startswith(TITLE)
+    except (OSError, ValueError):
+        return False
 
 
 def _texts(export: Nav2Export) -> dict[str, str]:

@@ -9,6 +9,8 @@ from navirl_cli.export.nav2 import Field, Nav2Export
 
 #: Releases whose nav2_bringup starts servers of keepout masks by itself.
 _BRINGUP = frozenset({Distro.KILTED, Distro.LYRICAL})
+#: How every README begins.
+TITLE = "# A learnt reward for Nav2"
 _NAMES = {"navfn": "NavFn", "smac2d": "SmacPlanner2D"}
 
 
@@ -60,7 +62,7 @@ def numbers(export: Nav2Export) -> Table:
 
 def _head(export: Nav2Export) -> str:
     planner = _NAMES[export.model.planner.planner]
-    return f"""# A learnt reward for Nav2 ({export.distro.value}, {planner})
+    return f"""{TITLE} ({export.distro.value}, {planner})
 
 Written by navirl {__version__}. A person costs amplitude x exp(-d^2 / (2 covariance_m2)) at the distance d from the
 person's centre.
