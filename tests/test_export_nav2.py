@@ -65,7 +65,7 @@ def as_map_server_reads(yaml):
 
 @pytest.mark.parametrize("field", Field)
 def test_the_mask_holds_the_costs_to_half_a_percent(tmp_path, field):
-    one = exported(tmp_path, field=field)
+    one = exported(tmp_path, field=field, factor=1.3)
     content, occupancy = as_map_server_reads(tmp_path / "mask.yaml")
     grid = PASSAGE.scene.lattice.grid
     assert content["resolution"] == pytest.approx(grid.resolution_m)
@@ -116,7 +116,7 @@ def test_costs_go_through_the_mask_as_through_keepout_filter():
 
 
 def test_speeds_fall_towards_people_and_zero_is_no_limit(tmp_path):
-    exported(tmp_path, slow_percent=40)
+    exported(tmp_path, slow_percent=40, factor=1.3)
     _, mask = as_map_server_reads(tmp_path / "speed_mask.yaml")
     server = YAML(typ="safe").load(tmp_path / "servers.yaml")["people_speed_info_server"]["ros__parameters"]
     limit = server["base"] + server["multiplier"] * mask
@@ -177,7 +177,7 @@ numpy.save("live.npy", mask_of(*given))
 
 
 def test_the_node_passes_its_own_test_and_makes_the_same_mask(tmp_path):
-    one = exported(tmp_path)
+    one = exported(tmp_path, factor=1.3)
     done = subprocess.run(
         [sys.executable, "test_people_mask_node.py"], cwd=tmp_path, capture_output=True, text=True, check=False
     )

@@ -16,7 +16,7 @@ import transfer
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(case, marks=[] if case.scene in {"two people", "straight corridor"} else [pytest.mark.slow])
+        pytest.param(case, marks=[] if case.scene == "two people" else [pytest.mark.slow])
         for case in transfer.CASES
         if case.factor is None
     ],
