@@ -192,7 +192,10 @@ def test_a_file_without_valid_iterations_is_refused(navirl, files, change, messa
 
 
 def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
-    words = ("ranks", files / "demos.json", "--reward", files / "reward.json", "--samples", "50")
+    content = json.loads((files / "reward.json").read_text())
+    content.update(demonstrations=["p01/1"], groups=["force, cycle 1"])
+    Path("pushed.json").write_text(json.dumps(content))
+    words = ("ranks", files / "demos.json", "--reward", "pushed.json", "--samples", "50")
     (learnt,) = figure_of(*words).axes
     assert learnt.get_title().startswith("force, cycle 1\nn = 1, p "), "the joystick was not learnt from"
     (other,) = figure_of(*words, "--group", "joystick").axes

@@ -27,7 +27,10 @@ def reach_line(content: Mapping[str, Any]) -> list[Block]:
     )
     both = found["min_distance_all_m"], found["min_distance_reachable_m"]
     if None not in both:
-        text += f". Mean least distance of the policy: {both[0]:.2f} m from all steps, {both[1]:.2f} m from these"
+        text += (
+            f". Mean least distance of the policy, from the robot's shell to a person's centre: {both[0]:.2f} m learnt "
+            f"from all steps, {both[1]:.2f} m from these"
+        )
     return [Paragraph(f"{text}.")]
 
 
