@@ -193,9 +193,8 @@ def test_a_file_without_valid_iterations_is_refused(navirl, files, change, messa
 
 def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
     content = json.loads((files / "reward.json").read_text())
-    content.update(demonstrations=["p01/1"], groups=["force, cycle 1"])
-    Path("pushed.json").write_text(json.dumps(content))
-    words = ("ranks", files / "demos.json", "--reward", "pushed.json", "--samples", "50")
+    Path("force.json").write_text(json.dumps({**content, "demonstrations": ["p01/1"], "groups": ["force, cycle 1"]}))
+    words = ("ranks", files / "demos.json", "--reward", "force.json", "--samples", "50")
     (learnt,) = figure_of(*words).axes
     assert learnt.get_title().startswith("force, cycle 1\nn = 1, p "), "the joystick was not learnt from"
     (other,) = figure_of(*words, "--group", "joystick").axes

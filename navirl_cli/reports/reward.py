@@ -1,7 +1,7 @@
 """The page of ``navirl report``."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,8 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: The metrics of the paper and two more.
+#: A lower end this many times smaller than a positive quantity does not bound it.
+NOTHING = 1e-3
 METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 
 
@@ -132,12 +134,16 @@ def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
     interval = ""
     if isfinite(one.lower) or isfinite(one.upper):
-        interval = f" ({_range(one.lower, one.upper)})"
+        interval = f" ({in_words(one.lower, one.upper, one.value)})"
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
-def _range(lower: float, upper: float) -> str:
-    """An interval in words; an open end is infinite."""
+def in_words(lower: float, upper: float, value: float) -> str:
+    """An interval in words; an open end is infinite, and one far below the value is none."""
+    if 0 <= lower < NOTHING * value:
+        lower = -inf
+    if not (isfinite(lower) or isfinite(upper)):
+        return "the demonstrations set no range"
     if not isfinite(lower):
         return f"less than {upper:.3g}"
     return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
