@@ -63,6 +63,20 @@ def _seen(found: Mapping[str, Any]) -> str:
     return "as stated" if found["seen_in"] is None else f"the farthest push, in {found['seen_in']}"
 
 
+def reach_unused(content: Mapping[str, Any], reach_m: float | None) -> list[str]:
+    """That a stated reach changed nothing.
+
+    Args:
+        content: Of the reward file.
+        reach_m: As stated; None where it was not.
+    """
+    if reach_m is None or content.get("reach") is not None or content["learnt_from"] == "reachable":
+        return []
+    return [
+        "`reach` has no effect: contact is unknown, nobody is in the scenes, or no step is in contact or within reach"
+    ]
+
+
 def evidence_remarks(chosen: Sequence[Demonstration], everyone: Sequence[Demonstration]) -> list[str]:
     """Where the demonstrations are poor evidence of what people want.
 
