@@ -3,6 +3,7 @@
 import json
 import re
 from base64 import b64decode
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.meaning import half_distance_m
+from navirl_cli.reports.reward import in_words
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
 
@@ -52,7 +54,8 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
         assert f"p01/{number}" in page
     document = json.loads((work / "demos.json").read_text())
     assert document["inputs"][0]["sha256"] in page.replace("<wbr>", "")
-    assert re.search(r"Kolmogorov-Smirnov D = 0\.\d{3}, p = ", page)
+    assert "Ranks of demonstrations among the policy" in page
+    assert "Not ranked, because the reward was not learnt from such trials: force, cycle 1 (2), joystick (2), " in page
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
 
 
@@ -89,3 +92,18 @@ def test_refusals(navirl, work):
     assert "exists already" in navirl(*words, "-o", work / "page.html", code=1).stderr
     swapped = navirl("report", work / "reward.json", work / "demos.json", "-o", "x.html", code=1).stderr
     assert "expected navirl demonstrations" in swapped
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((0.4, 0.9), "0.4 to 0.9"),
+        ((-inf, 0.9), "less than 0.9"),
+        ((0.4, inf), "more than 0.4"),
+        ((6e-35, 0.9), "less than 0.9"),
+        ((6e-35, inf), "the demonstrations set no range"),
+        ((-2.0, 0.9), "-2 to 0.9"),
+    ],
+)
+def test_a_range_in_metres_is_in_words(ends, text):
+    assert in_words(*ends, 0.6) == text
