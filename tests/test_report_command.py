@@ -48,6 +48,13 @@ def test_it_holds_parameters_and_their_meaning(work, page):
     assert "7 demonstrations of 1 participant, and a navigation reward learnt from 2 of them, of 1 participant." in page
 
 
+def test_it_says_in_front_how_to_drive(page):
+    assert page.index("How to pass people by this reward") < page.index("Parameters</h2>")
+    assert re.search(r"Pass the person at \d\.\d\d m between the robot's shell", page.replace("&#x27;", "'"))
+    assert "No intervals: a parameter has none, or an open one" in page  # a_p has no lower end
+    assert "In the scene of p01/3:" in page
+
+
 def test_it_holds_figures_trials_ranks_and_hashes(work, page):
     assert page.count("data:image/png;base64,") == 4  # paths, policy, properties, profile
     for number in range(1, 8):

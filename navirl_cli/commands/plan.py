@@ -121,7 +121,7 @@ def plan(
     learnt = read_reward(reward)
     planner = Planner(where.problem(learnt), learnt.reward)
     if recommend:
-        _recommend(learnt, planner.problem)
+        _recommend(learnt, planner.problem, seed)
     paths = planner.plan(Mode(mode), count or 1, seed)
     limits = Limits(max_speed, max_acceleration)
     room_m = tolerance or learnt.resolution_m
@@ -141,8 +141,8 @@ def plan(
         say(line)
 
 
-def _recommend(learnt: LearntReward, problem: "Problem") -> None:
+def _recommend(learnt: LearntReward, problem: "Problem", seed: int) -> None:
     """Print how to drive, for a straight passage and for the scene at hand."""
     from navirl_cli.reports.recommendation import recommendation_text
 
-    echo(recommendation_text(learnt, problem))
+    echo(recommendation_text(learnt, problem, seed))
