@@ -54,7 +54,7 @@ class _Root(LazyGroup):
         except NavirlError as error:
             if ctx.params.get("debug"):
                 raise
-            line, code = as_options(str(error)), 1
+            line, code = as_options(str(error)), error.exit_code
         except _Terminated:
             line, code = "terminated", 143  # as a shell reports a process that SIGTERM ended
         except KeyboardInterrupt:

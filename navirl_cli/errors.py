@@ -1,10 +1,12 @@
 """Expected errors, as one tree of exceptions.
 
 Every message names the file, topic or field, what was expected, what was found and the remedy, in one line. The command
-line prints it and exits with 1. Any other exception is a bug and keeps its traceback.
+line prints it and exits with 1, or with 3 where all trials were left out as cut off. Any other exception is a bug and
+keeps its traceback.
 """
 
 from collections.abc import Iterable
+from typing import ClassVar
 
 #: Largest number of names that a message lists.
 MOST_NAMES = 20
@@ -14,6 +16,9 @@ MOST_REASONS, MOST_LETTERS = 5, 700
 
 class NavirlError(Exception):
     """Base of all errors that navirl expects and explains."""
+
+    #: Of the command line.
+    exit_code: ClassVar[int] = 1
 
 
 class ArgumentError(NavirlError):
@@ -30,6 +35,12 @@ class FrameError(LogError):
 
 class DemonstrationError(NavirlError):
     """A trial cannot become a demonstration, or a demonstration contradicts itself."""
+
+
+class TruncatedError(DemonstrationError):
+    """Poses are missing at the beginning or end of trials, so that nothing of a recording is left."""
+
+    exit_code = 3
 
 
 class GridError(NavirlError):

@@ -51,7 +51,7 @@ def annotated(log, labels, output, **options):
 
 def demos(*logs, labels=None):
     """The demonstrations without the log's name, and what was lost."""
-    found = extract_recordings(logs, ExtractSettings(), LoadOptions(), labels=labels)
+    found = extract_recordings(logs, ExtractSettings(keep_truncated=True), LoadOptions(), labels=labels)
     return [replace(one, log="") for one in found.demonstrations()], [line.partition(": ")[2] for line in found.lost]
 
 

@@ -126,3 +126,31 @@ def test_an_interrupt_is_one_line_and_130(navirl, monkeypatch, words, command):
     monkeypatch.setattr(command, "callback", interrupted)
     result = navirl(*least(words, command), code=130)
     assert (result.stdout, result.stderr) == ("", "navirl: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "victim"),
+    [
+        (("extract", "logs", "-o", "logs/a.mcap"), "logs/a.mcap"),
+        (("extract", "logs/*.mcap", "-o", "logs/a.mcap"), "logs/a.mcap"),
+        (("extract", "logs", "-o", "hard.mcap"), "logs/a.mcap"),
+        (("extract", "soft.mcap", "-o", "hard.mcap"), "logs/a.mcap"),
+        (("evaluate", "study/demos.json", "-o", "hard.json"), "study/demos.json"),
+        (("report", "study/demos.json", "figure.png", "-o", "page.html"), "study/demos.json"),
+        (("plot", "paths", "study/demos.json", "-o", "figure.png"), "study/demos.json"),
+        (("study", "study/demos.json", "-o", "study"), "study/demos.json"),
+        (("import-study", "study/demos.json", "-o", "study"), None),
+    ],
+)
+def test_an_input_is_never_replaced_whatever_its_name(navirl, tmp_path, words, victim):
+    for name in ("logs/a.mcap", "study/demos.json"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text("mine")
+    (tmp_path / "hard.mcap").hardlink_to(tmp_path / "logs/a.mcap")
+    (tmp_path / "soft.mcap").symlink_to("logs/a.mcap")
+    for name in ("hard.json", "figure.png", "page.html"):
+        (tmp_path / name).hardlink_to(tmp_path / "study/demos.json")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    said = navirl(*words, "--force", code=1 if victim is None else 2).stderr
+    assert victim is None or "expected another file than the input " in " ".join(said.split())
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before

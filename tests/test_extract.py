@@ -153,6 +153,13 @@ def test_without_goals_the_error_gives_the_remedy(make):
         extract(make(goals=()), ExtractSettings())
 
 
+def test_a_goal_after_the_last_pose_is_no_trial(make):
+    late = make()
+    late = replace(late, goal_t_ns=np.array([late.t_ns[-1] + 10**9]), goal_m=np.array([[4.0, 0.0]]))
+    with pytest.raises(DemonstrationError, match=r"no trial became a demonstration: no goal is announced while poses"):
+        extract(late, ExtractSettings())
+
+
 def test_driven_cells_that_the_map_calls_occupied_are_freed_and_counted(make):
     # a wall of one cell 0.2 m beside the path: grown by 0.3 m it covers the path
     recording = make(obstacles=((30, 17),))

@@ -335,7 +335,7 @@ def test_a_log_whose_goal_comes_after_its_last_pose_has_no_trials(navirl, tmp_pa
     assert len(done.stdout.splitlines()) == 3
     assert "left out: late.mcap: no trial" in done.stderr
     done = navirl("extract", late, good, "-o", "a.json", code=3)
-    assert "late.mcap: no trial became a demonstration: no goal is announced while poses are recorded" in done.stderr
+    assert "late.mcap: no trial became a demonstration: a goal was announced after the last pose" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_where_an_axis_rests_is_no_deflection(load):
 def test_implausible_poses_are_left_out_and_counted(load):
     recording = load(odometry_nan=3, odometry_zero=4)
     assert recording.damage == (
-        "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 without a rotation); left out",
+        "run.mcap: 7 messages on /odom hold implausible values (3 not finite, 4 with a quaternion of zeros); left out",
     )
     seconds = (recording.t_ns - START_NS) / 1e9
     assert recording.xy_m == pytest.approx(position_m(seconds), abs=1e-9)
@@ -99,9 +99,9 @@ def test_goals_that_are_not_finite_are_left_out(load):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"map_short_by": 7}, "run.mcap: expected a map of 30 x 60 cells, found 1793"),
-        ({"resolution_m": 0.0}, "run.mcap: expected a map with a positive resolution and a finite origin, found 0.0"),
-        ({"resolution_m": float("nan")}, "run.mcap: expected a map with a positive resolution"),
+        ({"map_short_by": 7}, "run.mcap: topic /map: expected a map of 30 x 60 cells, found 1793"),
+        ({"resolution_m": 0.0}, "run.mcap: topic /map: expected cells of 0.001 to 100 m, found 0 m"),
+        ({"resolution_m": float("nan")}, "run.mcap: topic /map: expected cells of 0.001 to 100 m, found nan m"),
     ],
 )
 def test_invalid_maps_are_refused(load, changes, message):

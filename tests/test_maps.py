@@ -89,27 +89,59 @@ def test_a_map_in_an_unknown_frame(load):
 
 def test_a_map_whose_own_cells_are_turned(load):
     with pytest.raises(
-        LogError, match=r"run.mcap: expected a map whose cells run along .* found one rotated by 11.5 deg"
+        LogError, match=r"run.mcap: topic /map: expected a map whose cells run along .* found one rotated by 11.5 deg"
     ):
         load(drawn(yaw=0.2))
     message = drawn()
     message.info.origin.orientation.w = 0.0  # some tools leave the rotation empty
-    assert load(message).occupancy.origin_m == (-1.0, -2.0)
+    recording = load(message)
+    assert recording.occupancy.origin_m == (-1.0, -2.0)
+    assert recording.notes == (
+        "run.mcap: 1 maps on /map have an origin with a quaternion of zeros; taken as not rotated",
+    )
     message.info.origin.orientation.w = -1.0
     assert load(message).occupancy.origin_m == (-1.0, -2.0)
 
 
 @pytest.mark.parametrize(
+    ("numbers", "reason"),
+    [
+        ({"w": 3.0}, r"expected an origin with a rotation, found one with a quaternion of length 3, not 1; record the"),
+        (
+            {"w": np.nan},
+            r"found one with a quaternion that is not finite; record the map again, or give it with `map`$",
+        ),
+        ({"x": 0.1, "w": 0.995}, r"in the plane of its frame, found one tilted by roll 11\.5 and pitch 0\.0 degrees"),
+        ({"y": 1.0, "w": 0.0}, r"found one tilted by roll -?180\.0 and pitch 0\.0 degrees"),
+    ],
+)
+def test_an_origin_that_is_no_rotation_in_the_plane(load, numbers, reason):
+    message = drawn()
+    for name, value in numbers.items():
+        setattr(message.info.origin.orientation, name, value)
+    with pytest.raises(LogError, match=rf"^run.mcap: topic /map: .*{reason}"):
+        load(message)
+
+
+@pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("width", 7, r"^run.mcap: expected a map of 4 x 7 cells, found 24; record the map again$"),
-        ("height", 0, r"^run.mcap: expected a map of 0 x 6 cells, found 24; record the map again$"),
-        ("width", 2**32 - 1, r"^run.mcap: expected a map of 4 x 4294967295 cells, found 24; record the map again$"),
-        ("resolution", -0.05, r"expected a map with a positive resolution and a finite origin, found -0.05"),
+        ("width", 7, r"^run.mcap: topic /map: expected a map of 4 x 7 cells, found 24; record the map again$"),
+        ("height", 0, r"^run.mcap: topic /map: expected a map of 0 x 6 cells, found 24; record the map again$"),
+        (
+            "width",
+            2**32 - 1,
+            r"^run.mcap: topic /map: expected a map of 4 x 4294967295 cells, found 24; record the map again$",
+        ),
+        (
+            "resolution",
+            -0.05,
+            r"expected cells of 0.001 to 100 m, found -0.05 m; record the map again, or give it with `map`$",
+        ),
         (
             "resolution",
             np.inf,
-            r"expected a map with a positive resolution and a finite origin, found inf m and \(-1.0",
+            r"expected cells of 0.001 to 100 m, found inf m; record",
         ),
     ],
 )
@@ -123,10 +155,13 @@ def test_numbers_that_contradict_each_other(load, field, value, message):
 def test_an_infinite_origin_and_a_map_without_cells(load):
     grid = drawn(origin=(np.nan, 0.0))
     with pytest.raises(
-        LogError, match=r"a finite origin, found 0.05\d* m and \(nan, 0.0\); record the map again, or give"
+        LogError,
+        match=r"topic /map: expected a finite origin within 1e\+06 m, found \(nan, 0\) m; record the map again",
     ):
         load(grid)
-    with pytest.raises(LogError, match=r"^run.mcap: expected a map of 0 x 0 cells, found 0; record the map again$"):
+    with pytest.raises(
+        LogError, match=r"^run.mcap: topic /map: expected a map of 0 x 0 cells, found 0; record the map again$"
+    ):
         load(nav.grid(0, 0))
 
 

@@ -101,8 +101,9 @@ def test_rotations():
 def test_odometry_and_tf_take_the_same_quaternions(length):
     quaternion = np.array([[0.0, 0.0, length, 0.0]])
     link = Link("map", "odom", np.ones(1, dtype=np.int64), np.zeros((1, 3)), quaternion)
-    _, ignored = Curve.of([link], "map", "odom", fixed=False, zeros=False)
-    assert are_rotations(quaternion).tolist() == [ignored == 0] == [0.9 < length < 1.1]
+    _, faults = Curve.of([link], "map", "odom", fixed=False, zeros=False)
+    assert are_rotations(quaternion).tolist() == [not faults.ignored] == [0.9 < length < 1.1]
+    assert bool(faults.rescaled) == (length in (0.91, 1.09))
 
 
 @pytest.mark.parametrize(
@@ -134,13 +135,14 @@ def test_implausible_values_are_reported_with_an_example(values, report):
 def test_poses_without_a_rotation_are_counted_separately():
     values = np.zeros((9, 3))
     values[2, 0], values[4, 0], values[6, 0] = np.nan, 5e6, 7e6
-    rotations = np.array([True, False, False, True, True, True, False, True, True])
-    good, found = plausible_messages("/odom", values, PLACES, rotations)
+    quaternions = np.tile([0.0, 0.0, 0.0, 1.0], (9, 1))
+    quaternions[[1, 2, 6], 3] = 0.0, 0.0, 3.0
+    good, found = plausible_messages("/odom", values, PLACES, quaternions)
     assert good.tolist() == [True, False, False, True, False, True, False, True, True]
     assert [str(one) for one in found] == [
         (
-            "4 messages on /odom hold implausible values (1 not finite, 2 without a rotation, 1 impossible, such as "
-            "5e+06 m); left out"
+            "4 messages on /odom hold implausible values (1 not finite, 1 with a quaternion of zeros, "
+            "1 with a quaternion of length 3, not 1, 1 impossible, such as 5e+06 m); left out"
         )
     ]
 

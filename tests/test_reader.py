@@ -2,10 +2,13 @@
 
 import os
 import struct
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import log_factory as forge
 import mcap.writer
+import nav_log as nav
 import numpy as np
 import pytest
 import zstandard
@@ -241,29 +244,25 @@ def test_a_topic_that_no_file_has_is_left_out_and_an_empty_one_is_empty(tmp_path
     assert read(empty, {"/wrench": WRENCH_FIELDS}).series == {}
 
 
-@pytest.mark.parametrize(
-    ("times", "options"),
-    [
-        ((10, 20, 15), {}),
-        ((10, 20, 20, 15), {}),
-        ((10, 20, 30), {"chunk_size": 1}),
-        ((10, 20, 15), {"chunk_size": 1}),
-        ((20, 10), {"chunk_size": 1}),
-        ((10, 20, 30), {}),
-    ],
-)
-def test_the_latest_message_that_decodes_is_kept(tmp_path, times, options):
-    """It is the one of 20 ns; the one of 30 ns does not decode."""
+@pytest.mark.parametrize("options", [{}, {"chunk_size": 200}, {"compression": ""}])
+def test_packed_sequences_are_those_that_become_columns_otherwise(tmp_path, options):
+    """Maps of different sizes, the third one equal to the first; the last payload does not decode."""
+    rng = np.random.default_rng(4)
+    cells = [rng.integers(-1, 101, size, dtype=np.int8) for size in (24, 0, 24, 35, 24)]
+    cells[2] = cells[0]
+    made = [replace(nav.grid(), data=one) for one in cells]
     messages = [
-        forge.Message("/joy", forge.JOY, t, forge.cdr(forge.joy(t, [t, k]))[: -5 if t == 30 else None])
-        for k, t in enumerate(times)
+        forge.Message("/map", one.__msgtype__, t, forge.cdr(one)[: -5 if t == 4 else None])
+        for t, one in enumerate(made)
     ]
     path = forge.forge(tmp_path / "run.mcap", messages, **options)
-    series = read([path, path], {"/joy": ("axes[]",)}, latest=("/joy",)).series["/joy"]
-    assert series.log_time_ns.tolist() == [20]
-    # of equal times the last in the file
-    number = len(times) - 1 - times[::-1].index(20)
-    assert (series.columns["axes[]"].tolist(), series.counts["axes[]"].tolist()) == ([20.0, number], [2])
+    wanted = {"/map": ("data[]", "info.width")}
+    (packed, plain) = (read([path, path], wanted, packed=topics).series["/map"] for topics in (("/map",), ()))
+    assert packed.log_time_ns.tolist() == plain.log_time_ns.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert packed.counts["data[]"].tolist() == plain.counts["data[]"].tolist()
+    unpacked = [np.frombuffer(zlib.decompress(one), dtype=np.int8) for one in packed.columns["data[]"]]
+    assert np.concatenate(unpacked).tolist() == plain.columns["data[]"].tolist()
+    assert packed.columns["data[]"][0] is packed.columns["data[]"][4]
 
 
 def test_progress_reaches_the_end(tmp_path):

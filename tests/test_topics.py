@@ -298,7 +298,8 @@ def nav2(tmp_path):
     log.add("/local_costmap/costmap", nav.grid(frame="odom", value=60), nav.START_NS)
     for step in range(12):
         at = int(nav.unix(step / 2))
-        log.add("/wrench_filtered", nav.wrench(at, -7.0), at)
+        for late in range(0, 500, 100):
+            log.add("/wrench_filtered", nav.wrench(at + late * 10**6, -7.0), at + late * 10**6)
         log.add("/amcl_pose", nav.amcl_pose(at, 100.0, 100.0), at)
         log.add("/cmd_vel", nav.twist(0.4), at)
         log.add("/cmd_vel_teleop", nav.twist(0.3 if step < 9 else 0.0), at)

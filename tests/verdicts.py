@@ -153,8 +153,7 @@ def judge(mutant: Mutant, truth: Truth, path: Path, call: Call = plain_call) -> 
             alike = {
                 topic: WANTS[topic] for topic, type_name in truth.counts if counts[topic, type_name] and topic in WANTS
             }
-            # of maps only the latest matters
-            if damage := read(path, alike, latest=("/map",)).damage:
+            if damage := read(path, alike, packed=("/map",)).damage:
                 raise ForbiddenError(f"load_recording does not report: {damage[0]}")
         elif outcome == "as before" and counts == truth.counts and not same_recordings(recording, truth.recording):
             raise ForbiddenError("the columns are those of the intact log, the recording is not")

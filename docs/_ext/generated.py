@@ -112,7 +112,7 @@ def message_types() -> Iterator[tuple[str, str]]:
     for role in ROLES:
         rows = [
             (f"`{one.name}`", ", ".join(f"`{path}`" for path in dict.fromkeys(one.fields.values())))
-            for one in role.message_types
+            for one in (*role.message_types, *role.companions.values())
         ]
         needed = "Needed by `extract`." if role.needed else "Optional."
         table = written(Table((Column("message type"), Column("fields that are read")), tuple(rows)), Format.MARKDOWN)

@@ -77,10 +77,12 @@ def extract(
     rasterizer: str = "study",
     person: Point | Sequence[Point] = (),
     goal: Point | None = None,
+    keep_truncated: bool = False,
     contact_force: float = 3.0,
     wrench_filter: float = 5.0,
     gain: bool = False,
     topic: Mapping[str, str | Sequence[str]] | None = None,
+    namespace: str | None = None,
     map: PathLike | None = None,  # noqa: A002 the option's name
     frame: str | None = None,
     no_wrench: bool = False,
@@ -110,10 +112,12 @@ def extract(
         rasterizer: Rule that turns a path into cells: "study", "crossed" or "chain".
         person: Position (x, y) of a person, m in the map frame, or several positions; instead of the log's people.
         goal: Goal (x, y), m in the map frame, instead of the log's goals.
+        keep_truncated: Keep trials whose poses are missing at the beginning or end, marked as truncated.
         contact_force: A contact begins above this force, N, and ends below half of it.
         wrench_filter: The force is low-passed below this frequency, Hz.
         gain: Estimate the robot's gain, its velocity per sideways force.
         topic: Topic of a role, or several topics, if several are possible: ``{"wrench": "/ft"}``.
+        namespace: Namespace of the robot, in a log of several robots: "/robot1".
         map: Nav2 map YAML beside its pgm or png, instead of the map in the log.
         frame: Frame of all results, instead of the map's frame.
         no_wrench: Ignore forces; also for logs without a wrench. Contact is then unknown.
@@ -156,10 +160,12 @@ def extract(
         people_m=points_in(person) or None,
         goal_m=None if goal is None else points_in(goal)[0],
         gain=gain,
+        keep_truncated=keep_truncated,
     )
     map_file = None if map is None else Path(map)
     options = LoadOptions(
         topics=topics_in(topic),
+        namespace=namespace,
         time=chosen(TimeSource, time, "time"),
         frame=frame,
         wrench_frame=wrench_frame,
@@ -197,13 +203,17 @@ def _extracted(found: Recordings, said: dict[str, Any], files: Sequence[Path]) -
 
 
 def inspect(
-    *logs: PathLike, topic: Mapping[str, str | Sequence[str]] | None = None, check: bool = False
+    *logs: PathLike,
+    topic: Mapping[str, str | Sequence[str]] | None = None,
+    namespace: str | None = None,
+    check: bool = False,
 ) -> list[Overview]:
     """The content of logs, and the topics that :func:`extract` would use, as ``navirl inspect``.
 
     Args:
         *logs: As in :func:`extract`.
         topic: As in :func:`extract`.
+        namespace: As in :func:`extract`.
         check: Read every message. This also finds damage inside chunks.
 
     Returns:
@@ -218,7 +228,7 @@ def inspect(
     """
     if not logs:
         raise ArgumentError("`logs`: expected at least one log, found none")
-    return [overview(source, topics_in(topic), check=check) for source in sources_of(logs)]
+    return [overview(source, topics_in(topic), namespace, check=check) for source in sources_of(logs)]
 
 
 def fit(
@@ -231,6 +241,7 @@ def fit(
     condition: str | Collection[str] = (),
     cycle: int | None = None,
     only_corrected: bool = False,
+    truncated: bool = False,
     steps: str = "all",
     correct_bias: bool = False,
     intervals: str | None = None,
@@ -255,6 +266,7 @@ def fit(
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
+        truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, or only those during "contact".
         correct_bias: Subtract the first-order bias of maximum likelihood.
         intervals: "profile", "wald" (from standard errors) or "none"; by default profile with fewer than ten
@@ -290,7 +302,9 @@ def fit(
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
     conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
-    selected = select(demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, steps=which)
+    selected = select(
+        demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, truncated=truncated, steps=which
+    )
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")

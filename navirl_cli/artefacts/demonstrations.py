@@ -61,6 +61,7 @@ def settings_document(
 
     return asdict(settings) | {
         "topics": {role: list(names) for role, names in options.topics.items()},
+        "namespace": options.namespace,
         "time": options.time.value,
         "frame": options.frame,
         "wrench_frame": options.wrench_frame,
@@ -153,7 +154,9 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
         "robot_radius_m": d.robot_radius_m,
         "map": d.grid.digest,
         "cells": d.cells.tolist(),
+        "truncated": d.truncated,
         "notes": list(d.notes),
+        "warnings": list(d.warnings),
     }
 
 
@@ -212,7 +215,9 @@ def _read(content: Mapping[str, Any], grids: Mapping[str, Grid]) -> Demonstratio
             set=content.get("set"),
             nominal_m=None if content.get("nominal_m") is None else np.array(content["nominal_m"], dtype=float),
             laid_out_m_s=content.get("laid_out_m_s"),
+            truncated=content.get("truncated", False),
             notes=tuple(content["notes"]),
+            warnings=tuple(content.get("warnings", ())),
         )
     except (ValueError, TypeError, OverflowError) as error:
         raise ValueError(f"demonstration {name}: {error}") from error

@@ -14,6 +14,7 @@ from navirl_cli.commands.shared import (
     frame_option,
     goal_option,
     json_option,
+    namespace_option,
     output_option,
     say,
     split_option,
@@ -38,7 +39,7 @@ from navirl_cli.logs.load import LoadOptions
 )
 @click.argument("log", type=FilePath)
 @click.argument("trials", type=FilePath)
-@section("Input", topic_option, frame_option)
+@section("Input", topic_option, namespace_option, frame_option)
 @section("Trials", split_option, goal_option)
 @section("Output", output_option("Log to write; for a folder, a new folder."), json_option, force_option)
 def annotate(
@@ -46,6 +47,7 @@ def annotate(
     trials: Path,
     output: Path,
     topics: tuple[tuple[str, str], ...],
+    namespace: str | None,
     frame: str | None,
     split: str,
     goal: tuple[float, float] | None,
@@ -63,7 +65,7 @@ def annotate(
     """
     if not log.is_dir():
         check_output(output, [log, trials], force=force)
-    options = LoadOptions(topics=topics_by_role(topics), frame=frame)
+    options = LoadOptions(topics=topics_by_role(topics), namespace=namespace, frame=frame)
     with bytes_bar("annotate") as update:
         found = annotated(
             log, read_labels(trials), output, TrialSettings(Split(split), goal), options, force=force, progress=update

@@ -18,6 +18,7 @@ from navirl_cli.commands.shared import (
     json_option,
     logs_argument,
     merged,
+    namespace_option,
     output_option,
     say,
     split_option,
@@ -54,6 +55,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
 @section(
     "Input",
     topic_option,
+    namespace_option,
     click.option(
         "--map", "map_file", type=FilePath, help="Nav2 map YAML beside its pgm or png, instead of the map in the log."
     ),
@@ -86,6 +88,11 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
     goal_option,
     click.option(
         "--person", "people", multiple=True, type=Point(), help="Position of a person in the map frame, m; repeatable."
+    ),
+    click.option(
+        "--keep-truncated",
+        is_flag=True,
+        help="Keep trials whose poses are missing at the beginning or end, marked as truncated.",
     ),
 )
 @section(
@@ -154,10 +161,12 @@ def extract(
     rasterizer: str,
     people: tuple[tuple[float, float], ...],
     goal: tuple[float, float] | None,
+    keep_truncated: bool,
     contact_force: float,
     wrench_filter: float,
     gain: bool,
     topics: tuple[tuple[str, str], ...],
+    namespace: str | None,
     map_file: Path | None,
     frame: str | None,
     no_wrench: bool,
@@ -200,9 +209,11 @@ def extract(
         people_m=people or None,
         goal_m=goal,
         gain=gain,
+        keep_truncated=keep_truncated,
     )
     options = LoadOptions(
         topics=chosen,
+        namespace=namespace,
         time=TimeSource(time_source),
         frame=frame,
         wrench_frame=wrench_frame,

@@ -57,6 +57,9 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         help="Use trials of this condition only; repeatable.",
     ),
     click.option("--cycle", type=int, help="Use trials of this cycle only."),
+    click.option(
+        "--truncated", is_flag=True, help="Also use trials that are cut off, which extract --keep-truncated kept."
+    ),
     click.option("--only-corrected", is_flag=True, help="Use only trials in which the person intervened."),
     click.option(
         "--steps",
@@ -145,6 +148,7 @@ def fit(
     conditions: tuple[str, ...],
     cycle: int | None,
     only_corrected: bool,
+    truncated: bool,
     steps: str,
     correct_bias: bool,
     intervals: str | None,
@@ -172,6 +176,7 @@ def fit(
         conditions=conditions,
         cycle=cycle,
         only_corrected=only_corrected,
+        truncated=truncated,
         steps=Steps(steps),
     )
     chosen, evidence = selected.demonstrations, selected.evidence

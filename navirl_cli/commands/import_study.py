@@ -12,6 +12,7 @@ from navirl_cli.commands.shared import (
     json_option,
     output_option,
     progress_bar,
+    refuse_inputs,
     say,
 )
 from navirl_cli.commands.types import FilePath
@@ -48,6 +49,7 @@ def import_study(runs: Path, output: Path, as_json: bool, force: bool) -> None:
     from navirl_cli.reports.logs import imported_document, imported_table
 
     found, lost = runs_in(runs)
+    refuse_inputs([output / f"{run.name}.mcap" for run in found], [runs] if runs.is_file() else [])
     with progress_bar("import-study", len(found)) as update:
         imported = write_logs(found, output, force=force, progress=update)
     lost += [line for one in imported for line in one.lost]

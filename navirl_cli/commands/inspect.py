@@ -14,6 +14,7 @@ from navirl_cli.commands.shared import (
     json_option,
     logs_argument,
     merged,
+    namespace_option,
     say,
     split_option,
     topic_option,
@@ -56,12 +57,14 @@ from navirl_cli.reports.trials import trials_table
 @section(
     "Input",
     topic_option,
+    namespace_option,
     click.option("--check", is_flag=True, help="Read every message. This also finds damage inside chunks."),
 )
 @section("Output", json_option)
 def inspect(
     logs: tuple[Path, ...],
     topics: tuple[tuple[str, str], ...],
+    namespace: str | None,
     check: bool,
     trials: bool,
     split: str,
@@ -87,7 +90,7 @@ def inspect(
         raise click.UsageError("--check excludes --trials.")
     if not trials and (settings != TrialSettings() or frame):
         raise click.UsageError("--split, --goal and --frame need --trials.")
-    options = LoadOptions(topics=topics_by_role(topics), frame=frame)
+    options = LoadOptions(topics=topics_by_role(topics), namespace=namespace, frame=frame)
     refused: list[NavirlError] = []
     sources = _sources(logs, refused)
     if trials:
@@ -112,7 +115,7 @@ def _show(
     with bytes_bar("inspect") as update:
         for source in sources:
             try:
-                views.append(overview(source, options.topics, check=check, progress=update))
+                views.append(overview(source, options.topics, options.namespace, check=check, progress=update))
             except LogError as error:
                 refused.append(error)
     if refused and not views:

@@ -38,6 +38,9 @@ topic_option = click.option(
     shell_complete=completion.topics,
     help="Topic of a role, if several topics are possible, e.g. wrench=/ft; repeatable.",
 )
+namespace_option = click.option(
+    "--namespace", metavar="/ROBOT", help="The robot's namespace, in a log of several robots, e.g. /robot1."
+)
 frame_option = click.option("--frame", help="Frame of all results, instead of the map's frame.")
 split_option = click.option(
     "--split",
@@ -91,13 +94,45 @@ def check_output(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
     """Refuse, before any work, an output file that cannot be written or that is an input.
 
     Raises:
-        UsageError: It is one of the inputs.
+        UsageError: It is one of the inputs, as in :func:`refuse_inputs`.
         ArtefactError: It cannot be written.
     """
-    for path in inputs:
-        if output.resolve() == path.resolve():
-            raise click.UsageError(f"{output}: expected another file than the input {path}; choose another --output.")
+    refuse_inputs([output], inputs)
     check_writable(output, force=force)
+
+
+def refuse_inputs(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
+    """Refuse outputs that are inputs, by whatever name, or recordings in a folder or pattern of the inputs.
+
+    Raises:
+        UsageError: One is.
+    """
+    for path in inputs:
+        own = [path, *_files_of(path)]
+        for output in outputs:
+            if same := next((one for one in own if _are_same(output, one)), None):
+                raise click.UsageError(
+                    f"{output}: expected another file than the input {same}; choose another --output."
+                )
+
+
+def _are_same(output: Path, given: Path) -> bool:
+    """Whether two names are one file, also through links."""
+    return output.resolve() == given.resolve() or (output.exists() and given.exists() and output.samefile(given))
+
+
+def _files_of(path: Path) -> list[Path]:
+    """The files of the recordings that a folder or a pattern stands for."""
+    if path.is_file():
+        return []
+    from navirl_cli.errors import LogError
+    from navirl_cli.logs.sources import sources_of
+
+    try:
+        files = [file for source in sources_of([path], refused=[]) for file in source.files]
+    except LogError:  # whoever reads the input reports it
+        return []
+    return [*files, *{file.parent / "metadata.yaml" for file in files}]
 
 
 def echo_json(document: Any) -> None:

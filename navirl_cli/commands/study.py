@@ -21,6 +21,7 @@ from navirl_cli.commands.shared import (
     merged,
     output_option,
     progress_bar,
+    refuse_inputs,
     samples_option,
     say,
     seed_option,
@@ -35,6 +36,7 @@ from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import Input, check_writable, replacing, swapped_folder
+from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
@@ -98,7 +100,7 @@ def study(
 
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
-    _check_files(output, force=force)
+    _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)
     with swapped_folder(output) as folder:
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
@@ -151,9 +153,11 @@ class _Given:
 def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
     """Logs extracted, or the demonstrations of a file that extract wrote."""
     if len(logs) == 1 and logs[0].suffix == ".json":
-        demonstrations = demonstrations_in(logs[0])
-        notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
-        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, [])
+        held = demonstrations_in(logs[0])
+        demonstrations = whole(held)
+        notes = [f"{one.id}: {note}" for one in demonstrations for note in (*one.notes, *one.warnings)]
+        lost = [f"left out: {one.id} is cut off" for one in held if one.truncated]
+        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, lost)
     with bytes_bar("extract") as update:
         found = extract_recordings(logs, ExtractSettings(), options, progress=update)
     results, demonstrations = found.extractions, found.demonstrations()
@@ -169,10 +173,11 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
     )
 
 
-def _check_files(output: Path, *, force: bool) -> None:
-    """Check early that all results can be written.
+def _check_files(output: Path, inputs: Sequence[Path], *, force: bool) -> None:
+    """Check early that all results can be written, and that none is an input.
 
     Raises:
+        UsageError: One is an input.
         ArtefactError: A file exists already, or cannot be written.
     """
     from navirl_cli.figures.study import FORMATS
@@ -181,7 +186,9 @@ def _check_files(output: Path, *, force: bool) -> None:
     names = [output / "figures" / f"{name}.{extension}" for name in FIGURES for extension in FORMATS]
     if output.exists() and not output.is_dir():
         raise ArtefactError(f"{output}: expected the name of a folder, found a file; choose another `output`")
-    for path in (*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names):
+    paths = [*(output / name for name in (REPORT, PAGE, SUMMARY, DEMOS)), *names]
+    refuse_inputs(paths, inputs)
+    for path in paths:
         if path.parent.is_dir():
             check_writable(path, force=force)
 

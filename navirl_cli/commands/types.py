@@ -10,7 +10,8 @@ import click
 
 from navirl_cli.errors import unknown
 
-FilePath = click.Path(path_type=Path)
+#: Whoever reads a file says why it cannot be read, and goes on with others.
+FilePath = click.Path(path_type=Path, readable=False)
 
 
 class Choice(click.Choice[str]):

@@ -7,7 +7,9 @@ from navirl_cli.demos.contact import MIN_CONTACT_S, Pushes, PushSettings, hyster
 from navirl_cli.demos.grid import OCCUPIED_FROM, Grid, is_costmap
 from navirl_cli.demos.lines import path_length_m, thinned
 from navirl_cli.demos.trials import MIN_TRAVEL_M, Trial
+from navirl_cli.demos.truncation import POSE_GAP_S, missing_tf
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.logs.occupancy import Occupancy
 from navirl_cli.logs.recording import Recording
 
 #: A contact's force must exceed the noise this many times.
@@ -20,8 +22,8 @@ SAME_PLACE_M = 0.5
 LOOPS = 0.9
 #: More than this share of occupied cells means that the robot drove on another map; fewer occur beside walls.
 MOST_BLOCKED = 0.2
-#: Longer gaps in the poses and in the force make a trial unknown, s; shorter gaps in the force are noted.
-POSE_GAP_S, FORCE_GAP_S, NOTED_GAP_S = 1.0, 0.5, 0.1
+#: Longer gaps in the force make a trial unknown, s; shorter ones are noted.
+FORCE_GAP_S, NOTED_GAP_S = 0.5, 0.1
 
 
 def check_cells(cells: IntArray, xy_m: FloatArray, grid: Grid, robot_radius_m: float) -> None:
@@ -42,9 +44,12 @@ def check_cells(cells: IntArray, xy_m: FloatArray, grid: Grid, robot_radius_m: f
 def check_gaps(recording: Recording, trial: Trial, pushes: Pushes | None) -> None:
     """Refuse a trial with a long gap: it may be two, and without forces a push would be missed."""
     t_ns = recording.t_ns[trial.first : trial.stop]
-    gap_s = float(np.diff(t_ns).max(initial=0) / 1e9)
-    if gap_s > POSE_GAP_S:
-        raise DemonstrationError(f"poses are missing for {gap_s:.1f} s")
+    row = int(np.diff(t_ns, append=t_ns[-1]).argmax())
+    since, until = int(t_ns[row]), int(t_ns[min(row + 1, len(t_ns) - 1)])
+    if until - since > POSE_GAP_S * 1e9:
+        raise DemonstrationError(
+            f"poses are missing for {(until - since) / 1e9:.1f} s{missing_tf(recording, since, until)}"
+        )
     if pushes is None:
         return
     gap_s = missing_s(pushes, int(t_ns[0]), int(t_ns[-1]))
@@ -198,12 +203,11 @@ def _at(person: FloatArray, by: str) -> str:
     return f"{by} {person[0]:.2f},{person[1]:.2f}"
 
 
-def people_notes(recording: Recording, people: FloatArray) -> list[str]:
-    """A scene without people, and people in a wall or off the map."""
+def people_notes(recording: Recording, occupancy: Occupancy, people: FloatArray) -> list[str]:
+    """A scene without people, and people in a wall or off the map of a trial."""
     if len(people) == 0:
         remedy = "" if len(recording.people_t_ns) else "; give their places with `person` x,y"
         return [f"no people in the scene{remedy}"]
-    occupancy = recording.occupancy
     walls = Grid(occupancy.data >= OCCUPIED_FROM, occupancy.resolution_m, occupancy.origin_m)
     inside, blocked = walls.contains(walls.cells_of(people)), walls.is_occupied(walls.cells_of(people))
     return [

@@ -129,8 +129,12 @@ class Demonstration(ByContent):
     nominal_m: FloatArray | None = None
     #: Speed at which positions without times were laid out, m/s; None where t_s was measured.
     laid_out_m_s: float | None = None
+    #: Whether poses are missing at its beginning or end, so that it starts elsewhere or its last cell is no goal.
+    truncated: bool = False
     #: What a reader of the results should know about this trial.
     notes: tuple[str, ...] = field(default=())
+    #: The same about its recording.
+    warnings: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
         """Check shapes, order, and that the path fits the grid."""

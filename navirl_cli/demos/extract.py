@@ -23,13 +23,16 @@ from navirl_cli.demos.checks import (
 from navirl_cli.demos.contact import Pushes, PushSettings, contacts_within, pushes_of
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration
 from navirl_cli.demos.gain import Gain, gain_of
-from navirl_cli.demos.grid import Grid, grid_from_occupancy
+from navirl_cli.demos.grid import Grid
+from navirl_cli.demos.ground import TrialGrids
 from navirl_cli.demos.labelling import guess_notes, labelled, record_notes, row_notes, stated_of
 from navirl_cli.demos.labels import Label
 from navirl_cli.demos.people import People, people_during
 from navirl_cli.demos.rasterize import Rule, rasterize
 from navirl_cli.demos.trials import Split, Trial, entries_by_trial, trials_of, with_goal
-from navirl_cli.errors import MOST_NAMES, DemonstrationError, NavirlError, joined
+from navirl_cli.demos.truncation import truncation_of, unseen_goals
+from navirl_cli.errors import MOST_NAMES, DemonstrationError, NavirlError, TruncatedError, joined
+from navirl_cli.logs.occupancy import Occupancy
 from navirl_cli.logs.recording import Declared, Recording
 
 #: A joystick that is deflected beyond this steers the robot, and for this long in all it makes a joystick trial.
@@ -60,6 +63,8 @@ class ExtractSettings:
     goal_m: tuple[float, float] | None = None
     #: Whether to estimate how fast the robot gives way to a push.
     gain: bool = False
+    #: Whether trials that are cut off are kept, marked as truncated.
+    keep_truncated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,27 +107,26 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         NavirlError: No trial of the recording is usable, or a label fits none.
     """
     recording, trials, stated = _trials(recording, settings, labels)
-    occupancy, radius_m = recording.occupancy, _radius_m(recording, settings)
-    grid = grid_from_occupancy(occupancy.data, occupancy.resolution_m, occupancy.origin_m, radius_m).resampled(
-        settings.resolution_m
-    )
+    grids = TrialGrids(recording, _radius_m(recording, settings), settings.resolution_m)
     pushes = None if recording.wrench is None else pushes_of(recording, settings.push)
     found: list[Demonstration] = []
-    skipped: list[tuple[int, str]] = []
+    skipped: list[tuple[int, NavirlError]] = []
     for number, (trial, declared) in enumerate(zip(trials, stated, strict=True), start=1):
         name = f"{declared.participant or recording.log.partition('.mcap')[0]}/{number}"
         try:
-            found.append(_demonstration(recording, trial, pushes, grid, settings, name, declared))
+            found.append(_demonstration(recording, trial, pushes, grids, settings, name, declared))
         except NavirlError as error:
-            skipped.append((number, str(error)))
+            skipped.append((number, error))
+    unseen = unseen_goals(recording) if settings.split is Split.GOAL else ""
+    reasons = [*_grouped(skipped), *([unseen] if unseen else [])]
     if not found:
-        reasons = _grouped(skipped) or ["no goal is announced while poses are recorded"]
+        cut = bool(skipped) and all(isinstance(error, TruncatedError) for _, error in skipped)
+        reasons = reasons or ["no goal is announced while poses are recorded"]
         prefix = f"{recording.log}: "
         # what was lost on the way may be the cause
-        raise DemonstrationError(
-            f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
-        )
-    lines = tuple(f"{recording.log}: {line}" for line in _grouped(skipped))
+        text = f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
+        raise TruncatedError(text) if cut else DemonstrationError(text)
+    lines = tuple(f"{recording.log}: {line}" for line in reasons)
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     own = {(number := _number(one)): stated[number - 1] for one in found}
     notes += [
@@ -133,9 +137,12 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
     gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
     if settings.gain and gain is None:
         notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
+    # where and what stands in the log's own damage, whose paths mean nothing elsewhere
+    lost = ["data of its log is lost, as extract lists"] if recording.damage else []
+    warnings = (*lost, *(line.removeprefix(f"{recording.log}: ") for line in notes))
     return Extraction(
         log=recording.log,
-        demonstrations=tuple(found),
+        demonstrations=tuple(replace(one, warnings=warnings) for one in found),
         trials=len(trials),
         skipped=lines,
         damage=recording.damage,
@@ -162,11 +169,11 @@ def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
     return unique
 
 
-def _grouped(skipped: list[tuple[int, str]]) -> list[str]:
+def _grouped(skipped: Sequence[tuple[int, NavirlError]]) -> list[str]:
     """One line for each reason."""
     by_reason: dict[str, list[str]] = {}
-    for number, reason in skipped:
-        by_reason.setdefault(reason, []).append(str(number))
+    for number, error in skipped:
+        by_reason.setdefault(str(error), []).append(str(number))
     return [
         f"trial{'s' if len(numbers) > 1 else ''} {_numbers(numbers)}: {reason}" for reason, numbers in by_reason.items()
     ]
@@ -182,7 +189,7 @@ def _demonstration(
     recording: Recording,
     trial: Trial,
     pushes: Pushes | None,
-    grid: Grid,
+    grids: TrialGrids,
     settings: ExtractSettings,
     name: str,
     declared: Declared,
@@ -193,16 +200,24 @@ def _demonstration(
     start_ns, stop_ns = int(t_ns[0]), int(t_ns[-1])
     check_travel(xy)
     check_gaps(recording, trial, pushes)
+    cut_off = _cut_off(recording, trial, settings)
     goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
     radius_m = _radius_m(recording, settings)
-    people = _people(recording, settings, declared, trial, radius_m)
+    ground = grids.during(start_ns, stop_ns)
+    grid = ground.grid
+    people = _people(recording, settings, declared, trial, ground.occupancy)
     check_start(people.people_m, xy[0], radius_m)
     cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
     if not trial.arrived:
         check_goal(free, xy[0], goal)
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
     observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
-    notes = [*path_notes(trial, cells, grid, xy[-1] - goal), *jump_notes(recording, start_ns, stop_ns)]
+    notes = [
+        *cut_off,
+        *ground.notes,
+        *path_notes(trial, cells, grid, xy[-1] - goal),
+        *jump_notes(recording, start_ns, stop_ns),
+    ]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
@@ -225,8 +240,23 @@ def _demonstration(
         set=declared.set,
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
+        truncated=bool(cut_off),
         notes=(*notes, *people.notes),
     )
+
+
+def _cut_off(recording: Recording, trial: Trial, settings: ExtractSettings) -> list[str]:
+    """A note where a trial is cut off, which is refused unless the user keeps such trials."""
+    reason = truncation_of(recording, trial, settings.split)
+    if not reason:
+        return []
+    away = recording.xy_m[trial.stop - 1] - (recording.xy_m[trial.stop - 1] if trial.goal_m is None else trial.goal_m)
+    far = (
+        "" if trial.arrived or trial.goal_m is None else f", and the last pose is {np.hypot(*away):.2f} m from the goal"
+    )
+    if not settings.keep_truncated:
+        raise TruncatedError(f"cut off: {reason}{far}; keep it, marked as truncated, with `keep_truncated`")
+    return [f"truncated: {reason}"]
 
 
 def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple[IntArray, Grid]:
@@ -238,19 +268,20 @@ def _on_grid(xy_m: FloatArray, grid: Grid, rule: Rule, radius_m: float) -> tuple
 
 
 def _people(
-    recording: Recording, settings: ExtractSettings, declared: Declared, trial: Trial, radius_m: float
+    recording: Recording, settings: ExtractSettings, declared: Declared, trial: Trial, occupancy: Occupancy
 ) -> People:
     """The people of a trial: those placed by the user, else by labels, with what contradicts them; else the log's."""
-    xy = recording.xy_m[trial.first : trial.stop]
+    xy, radius_m = recording.xy_m[trial.first : trial.stop], _radius_m(recording, settings)
     logged = people_during(recording, int(recording.t_ns[trial.first]), int(recording.t_ns[trial.stop - 1]))
     by = "`person`" if settings.people_m is not None else "people_m"
     placed = declared.people_m if settings.people_m is None else np.array(settings.people_m)
     if placed is None:
-        return replace(logged, notes=(*logged.notes, *people_notes(recording, logged.people_m)))
+        return replace(logged, notes=(*logged.notes, *people_notes(recording, occupancy, logged.people_m)))
     check_end(placed, xy[-1], radius_m, by)
     known = logged.people_m if len(recording.people_t_ns) else None
     notes = placed_notes(placed, known, xy, radius_m, by)
-    return People(placed, notes=(*notes, *(people_notes(recording, placed) if len(placed) else ["nobody was there"])))
+    own = people_notes(recording, occupancy, placed) if len(placed) else ["nobody was there"]
+    return People(placed, notes=(*notes, *own))
 
 
 def _steered_s(recording: Recording, start_ns: int, stop_ns: int) -> float:

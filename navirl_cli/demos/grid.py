@@ -26,6 +26,8 @@ _NUMBER: IntArray = np.array([[5, 4, 3], [6, -1, 2], [7, 0, 1]], dtype=np.int64)
 
 #: Finer cells mean nothing to a robot, coarser ones hold no paths, m.
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 0.01, 2.0
+#: Maps of more cells do not fit into memory with what is computed on them.
+MOST_CELLS = 50_000_000
 #: map_server's default: an occupancy of 65 % and more is an obstacle.
 OCCUPIED_FROM = 65
 #: A costmap marks cells within the robot's inscribed radius 99 and obstacles themselves 100.
@@ -162,6 +164,12 @@ class Grid(ByContent):
                 f"cells must have sides of {MIN_RESOLUTION_M} to {MAX_RESOLUTION_M} m, found {resolution_m} m"
             )
         rows, columns = (max(1, ceil(n * self.resolution_m / resolution_m - 1e-9)) for n in self.shape)
+        if rows * columns > MOST_CELLS:
+            raise GridError(
+                f"a map of {self.shape[1]} x {self.shape[0]} cells of {self.resolution_m:g} m: expected at most "
+                f"{MOST_CELLS} cells of {resolution_m:g} m, found {columns} x {rows}; check the map, or choose a "
+                "larger `resolution`"
+            )
         occupied = np.zeros((rows, columns), dtype=bool)
         taken = np.argwhere(self.occupied)
         ratio = self.resolution_m / resolution_m

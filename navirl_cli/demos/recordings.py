@@ -11,7 +11,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
 from navirl_cli.demos.labelling import check_agreement
 from navirl_cli.demos.labels import Label, Labels, labels_by_source
-from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, brief, joined
+from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, TruncatedError, brief, joined
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
@@ -101,7 +101,8 @@ def extract_recordings(
     if len(failed) == 1 and not good:
         raise failed[0]
     if not good:
-        raise DemonstrationError(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
+        kind = TruncatedError if all(isinstance(error, TruncatedError) for error in failed) else DemonstrationError
+        raise kind(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),

@@ -48,6 +48,14 @@ class Trial:
     goal_m: tuple[float, float] | None
     #: False where a goal was announced and the robot did not rest near it.
     arrived: bool = True
+    #: When its goal was announced, ns; None without one.
+    from_ns: int | None = None
+    #: Until when it could have gone on, ns: its declared end, or the next goal; None for the log's end.
+    until_ns: int | None = None
+    #: One past the last pose until then; None for the log's end.
+    border: int | None = None
+    #: Whether the session record gives its end.
+    declared: bool = False
 
 
 def trials_of(recording: Recording, split: Split) -> list[Trial]:
@@ -129,15 +137,20 @@ def _at_goals(recording: Recording, standing: BoolArray) -> list[Trial]:
     """From each new goal to the rest near it, before the next new goal."""
     starts = np.searchsorted(recording.t_ns, recording.goal_t_ns)
     kept: list[tuple[int, FloatArray]] = []
-    for start, goal in zip(starts.tolist(), recording.goal_m, strict=True):
+    times: list[int] = []
+    for start, goal, t_ns in zip(starts.tolist(), recording.goal_m, recording.goal_t_ns.tolist(), strict=True):
         if start < len(recording.t_ns) and (not kept or _is_new(recording, kept[-1], start, goal)):
             kept.append((start, goal))
+            times.append(t_ns)
     if not kept:
         return []
     borders = [start for start, _ in kept[1:]] + [len(recording.t_ns)]
     return [
-        _towards(recording, standing, (start, border), goal)
-        for (start, goal), border in zip(kept, borders, strict=True)
+        replace(
+            _towards(recording, standing, (start, border), goal, until_ns),
+            from_ns=max(from_ns, recording.span_ns[0]),
+        )
+        for (start, goal), border, from_ns, until_ns in zip(kept, borders, times, [*times[1:], None], strict=True)
         if border - start > 1
     ]
 
@@ -151,29 +164,35 @@ def _is_new(recording: Recording, present: tuple[int, FloatArray], start: int, g
     return bool((distance < ARRIVED_M).any() and distance[-1] > ARRIVED_M)
 
 
-def _towards(recording: Recording, standing: BoolArray, span: tuple[int, int], goal: FloatArray) -> Trial:
+def _towards(
+    recording: Recording, standing: BoolArray, span: tuple[int, int], goal: FloatArray, until_ns: int | None
+) -> Trial:
     """The trial within a span of poses that ends near a goal."""
     first, border = span
     distance = np.hypot(*(recording.xy_m[first:border] - goal).T)
     target = (float(goal[0]), float(goal[1]))
     declared = _declared_stop(recording, first, border)
     if declared is not None:
-        return Trial(first, declared, target, arrived=bool(distance[declared - first - 1] < ARRIVED_M))
+        stop, stop_ns = declared
+        near = bool(distance[stop - first - 1] < ARRIVED_M)
+        return Trial(first, stop, target, arrived=near, until_ns=stop_ns, border=stop, declared=True)
     resting = np.flatnonzero(standing[first:border] & (distance < ARRIVED_M) & _has_left(distance))
     if len(resting):
         return Trial(first, first + int(resting[0]) + 1, target)
     nearest = int(distance.argmin())
-    return Trial(first, first + max(nearest, 1) + 1, target, arrived=bool(distance[nearest] < ARRIVED_M))
+    near = bool(distance[nearest] < ARRIVED_M)
+    return Trial(first, first + max(nearest, 1) + 1, target, arrived=near, until_ns=until_ns, border=border)
 
 
-def _declared_stop(recording: Recording, first: int, border: int) -> int | None:
-    """One past the last pose of the trial that starts with a pose, from the session record; None without an entry."""
+def _declared_stop(recording: Recording, first: int, border: int) -> tuple[int, int] | None:
+    """One past the last pose of the trial that starts with a pose, and its end, ns, from the session record."""
     start_ns = int(recording.t_ns[first])
     ended = [entry for entry in recording.session.declared if entry.stop_ns is not None]
     entry = min(ended, key=lambda entry: abs(entry.t_ns - start_ns), default=None)
     if entry is None or entry.stop_ns is None or abs(entry.t_ns - start_ns) > SAME_START_S * 1e9:
         return None
-    return int(np.clip(np.searchsorted(recording.t_ns, entry.stop_ns, side="right"), first + 2, border))
+    stop = int(np.clip(np.searchsorted(recording.t_ns, entry.stop_ns, side="right"), first + 2, border))
+    return stop, entry.stop_ns
 
 
 def _has_left(distance: FloatArray) -> BoolArray:

@@ -35,6 +35,7 @@ def select(
     conditions: Collection[str] = (),
     cycle: int | None = None,
     only_corrected: bool = False,
+    truncated: bool = False,
     steps: Steps = Steps.ALL,
 ) -> Selection:
     """Choose demonstrations and collect their steps.
@@ -44,6 +45,7 @@ def select(
         conditions: Values of :class:`~navirl_cli.demos.demonstration.Condition`; none for all.
         cycle: Number of the cycle; None for all.
         only_corrected: Only demonstrations in which the person intervened.
+        truncated: Also demonstrations that are cut off.
         steps: All steps, or those during contact; demonstrations without such steps are left out.
 
     Returns:
@@ -60,6 +62,8 @@ def select(
     ]
     if demonstrations and not chosen:
         raise _not_among(demonstrations, conditions, cycle)
+    if not truncated:
+        chosen = whole(chosen)
     if only_corrected:
         chosen = _corrected(chosen)
     masks = None
@@ -81,6 +85,21 @@ def _not_among(
         own = [*([one.condition.value] if conditions else []), *([] if cycle is None else [own_cycle])]
         there[", ".join(own)] = None
     return DemonstrationError(unknown(" and ".join(arguments), ", ".join(asked), sorted(there)))
+
+
+def whole(chosen: Sequence[Demonstration]) -> list[Demonstration]:
+    """The demonstrations that are not cut off.
+
+    Raises:
+        DemonstrationError: All are.
+    """
+    kept = [one for one in chosen if not one.truncated]
+    if chosen and not kept:
+        raise DemonstrationError(
+            f"expected demonstrations that are whole, found {len(chosen)} that are cut off; extract logs with whole "
+            "trials, or learn from these with `truncated`, where a last cell may be no goal"
+        )
+    return kept
 
 
 def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:

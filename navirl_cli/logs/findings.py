@@ -23,6 +23,7 @@ class Kind(Enum):
     """The kinds of findings: severity, and the sentence in which a finding's fields are filled in."""
 
     # topics
+    OTHER_ROBOT = (_NOTE, "{about} is left out: it is not in the namespace of odometry, wrench and map")
     SEVERAL_TYPES = (_NOTE, "{about} holds messages of several types: {detail}")
     # time
     SIMULATED = (
@@ -49,6 +50,43 @@ class Kind(Enum):
         _NOTE,
         "{about} jumps by {size:+.2f} s {at_s:.1f} s after the start; later times were shifted to continue",
     )
+    CLOCK_STEPS = (
+        _NOTE,
+        (
+            "{about} jumps {count} times, by up to {size:+.2f} s, first {at_s:.1f} s after the start; later times were "
+            "shifted to continue"
+        ),
+    )
+    LATER_RECEIPTS = (
+        _NOTE,
+        "messages on {about} are received {size:+.2f} s later than before from {at_s:.1f} s on; their stamps are used",
+    )
+    PAUSE = (
+        _NOTE,
+        (
+            "{about} pause for {size:.2f} s {at_s:.1f} s after the start, while the robot stands still: the recording "
+            "paused, or a clock jumped"
+        ),
+    )
+    PAUSES = (
+        _INFO,
+        "{about} pause {count} times while the robot stands still, by up to {size:.2f} s, first at {at_s:.1f} s",
+    )
+    NO_RECEIPTS = (_NOTE, "{about} gives no usable times of receipt; stamps and the order in the file are used")
+    WRONG_RECEIPTS = (
+        _NOTE,
+        (
+            "{about} gives {count} times of receipt that cannot be true, such as {detail}; stamps and the order in the "
+            "file are used in their place"
+        ),
+    )
+    STAMPED_AHEAD = (
+        _NOTE,
+        (
+            "{about} is stamped {size:.2f} s ahead, as AMCL does by its transform_tolerance; it is used from its "
+            "receipt on"
+        ),
+    )
     OTHER_CLOCK = (
         _NOTE,
         "{about} is stamped by another clock than {detail}: {size:+.3f} s by the times of receipt; aligned",
@@ -63,13 +101,20 @@ class Kind(Enum):
     OUT_OF_ORDER = (_NOTE, "{count} messages on {about} were received out of order; sorted by time")
     REPEATED = (_NOTE, "{count} messages on {about} repeat the time of another; the first counts")
     # space
-    IGNORED_TRANSFORMS = (
+    IGNORED_TRANSFORMS = (_NOTE, "transforms {about}: {detail}; ignored")
+    RESCALED = (_NOTE, "{about}: {detail}")
+    STATIC_CHANGES = (
         _NOTE,
-        "{count} transforms {about} are implausible, or were sent before the clock ran; ignored",
+        "the static transform {about} is sent again with another value: {detail}; each counts from when it was sent",
     )
     SEVERAL_PARENTS = (_NOTE, "tf gives {about!r} several parents in turn: {detail}")
     UNCOVERED_POSES = (_NOTE, "{count} poses lie outside the time that tf covers; left out")
     POSES_IN_GAPS = (_LOSS, "{count} poses lie in gaps of tf longer than {size:g} s; left out")
+    POSES_BEGIN_LATE = (_INFO, "poses begin {size:.1f} s after the other measurements; a trial from before is cut off")
+    POSES_END_EARLY = (
+        _INFO,
+        "poses end {size:.1f} s before the other measurements; a trial that has not arrived by then is cut off",
+    )
     POSES_FROM_TF = (_NOTE, "no odometry: poses are those of {about!r} in tf")
     BASE_ASSUMED = (
         _NOTE,
@@ -83,6 +128,10 @@ class Kind(Enum):
         _NOTE,
         "the wrench's frame {about!r} moves on {detail!r}; the handle's weight may not cancel out",
     )
+    UNUSABLE_MAPS = (_LOSS, "{count} maps on {about} cannot be used ({detail}); left out")
+    EMPTY_ORIGIN = (_NOTE, "{count} maps on {about} have an origin with a quaternion of zeros; taken as not rotated")
+    OUTSIDE_UPDATES = (_LOSS, "{count} updates on {about} do not lie within the map before them; left out")
+    MAP_CHANGES = (_NOTE, "{about} changes: {detail}; each trial has the map in force at its end")
     # measurements
     IMPLAUSIBLE = (_LOSS, "{count} messages on {about} hold implausible values ({detail}); left out")
     OTHER_FRAME = (_LOSS, "{count} messages on {about} are not in frame {detail!r}, as the others are; left out")

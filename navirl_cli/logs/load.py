@@ -21,23 +21,27 @@ from pathlib import Path
 from typing import Final
 
 from navirl_cli.arrays import ByContent
-from navirl_cli.errors import LogError, NavirlError, joined
+from navirl_cli.errors import FrameError, LogError, NavirlError, joined
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.findings import Findings, Severity, texts
+from navirl_cli.logs.findings import Finding, Findings, Kind, Severity, texts
 from navirl_cli.logs.messages.reader import Contents, Progress, scan
 from navirl_cli.logs.recording import Occupancy, Recording, Session
-from navirl_cli.logs.roles.clocks import TimeSource
+from navirl_cli.logs.roles.clocks import NS_PER_S, TimeSource
 from navirl_cli.logs.roles.commands import commands_of
 from navirl_cli.logs.roles.session import session_of
 from navirl_cli.logs.roles.space import Placed, in_one_frame
 from navirl_cli.logs.roles.tables import read_tables
-from navirl_cli.logs.roles.times import Tables, Timed, on_one_clock
+from navirl_cli.logs.roles.times import Tables, Timed, measured_ns, on_one_clock
 from navirl_cli.logs.roles.topics import HOLDS, Choice, choose, is_missing, refusal, shared_topics, topics_of, undefined
 from navirl_cli.logs.sources import Source
 
 #: Where the damage of a topic begins in its sentence.
 _DAMAGE: Final = re.compile(r"^.*?: bytes \d+ to \d+: (topic \S+: )?")
+
+
+#: Poses that are missing for longer at the log's beginning or end are worth a word, s.
+_MISSING_S: Final = 1.0
 
 
 class Forces(StrEnum):
@@ -55,6 +59,8 @@ class LoadOptions(ByContent):
 
     #: Topics by role, in place of those that navirl would choose.
     topics: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    #: Of the robot, in a log of several robots.
+    namespace: str | None = None
     time: TimeSource = TimeSource.HEADER
     #: The frame that everything is brought into, in place of the map's.
     frame: str | None = None
@@ -148,7 +154,7 @@ def follow(
     """
     log = source.name
     topics = topics_of(contents)
-    choices = choose(log, topics, options.topics)
+    choices = choose(log, topics, options.topics, options.namespace)
     chosen = _wanted(choices, options)
     refusals: list[NavirlError] = [refusal(log, topics, one) for one in chosen.values() if is_missing(one, chosen)]
     read = read_tables(log, files, chosen, progress)
@@ -158,16 +164,26 @@ def follow(
     try:
         timed = on_one_clock(log, read.tables, options.time)
         placed = in_one_frame(
-            log, timed.tables, options.frame, options.wrench_frame, options.occupancy, options.force_scale
+            log,
+            timed.tables,
+            options.frame,
+            options.wrench_frame,
+            options.occupancy,
+            options.force_scale,
+            options.namespace,
         )
         refusals += placed.refusals
     except NavirlError as error:
         # without a clock nothing goes on; why there is none is known where a topic is missing or unread
         refusals += [] if refusals else [error]
+    foreign = {topic.name: None for choice in chosen.values() for topic in choice.foreign}
+    refusals = [_with_foreign(one, tuple(foreign)) for one in refusals]
     findings = (
+        *(Finding(Kind.OTHER_ROBOT, name) for name in foreign),
         *shared_topics(topics, chosen),
         *(timed.findings if timed else ()),
         *(placed.findings if placed else ()),
+        *(_missing_poses(timed.tables, placed) if timed and placed else ()),
     )
     damage = source.damage if nothing else (*source.damage, *read.damage)
     lost = (*map(str, damage), *texts(log, findings, Severity.LOSS))
@@ -182,6 +198,26 @@ def follow(
     except NavirlError as error:
         refusals.append(error)
     return Line(choices, timed, placed, findings, lost, recording, tuple(refusals))
+
+
+def _missing_poses(tables: Tables, placed: Placed) -> Findings:
+    """That poses begin after or end before everything else."""
+    measured = measured_ns(tables)
+    if placed.poses is None or measured is None or not len(placed.poses.t_ns):
+        return ()
+    late_s = (int(placed.poses.t_ns[0]) - measured[0]) / NS_PER_S
+    early_s = (measured[1] - int(placed.poses.t_ns[-1])) / NS_PER_S
+    known = ((Kind.POSES_BEGIN_LATE, late_s), (Kind.POSES_END_EARLY, early_s))
+    return tuple(Finding(kind, "poses", size=size_s) for kind, size_s in known if size_s > _MISSING_S)
+
+
+def _with_foreign(refusal: NavirlError, foreign: Sequence[str]) -> NavirlError:
+    """A refusal that, where frames do not connect, names the tf topics that were left out as another robot's."""
+    if not isinstance(refusal, FrameError) or not foreign:
+        return refusal
+    role = "tf_static" if foreign[0].endswith("tf_static") else "tf"
+    left_out = f"{', '.join(foreign)} left out as another robot's; if it is this one's, `topic` {role}={foreign[0]}"
+    return FrameError(f"{refusal}; {left_out}")
 
 
 def _wanted(choices: Mapping[str, Choice], options: LoadOptions) -> dict[str, Choice]:
@@ -209,6 +245,7 @@ def _recording(
         yaw_rad=placed.poses.yaw_rad,
         wrench=placed.wrench,
         occupancy=placed.occupancy,
+        maps=placed.maps,
         goal_t_ns=placed.goal_t_ns,
         goal_m=placed.goal_m,
         people_t_ns=placed.people_t_ns,
@@ -218,6 +255,8 @@ def _recording(
         session=session,
         velocity_m_s=placed.poses.velocity_m_s,
         jumps=placed.poses.jumps,
+        unplaced_ns=placed.poses.unplaced_ns,
+        measured_ns=measured_ns(tables),
         no_goal=_no_goal(tables, placed),
         damage=damage,
         notes=notes,

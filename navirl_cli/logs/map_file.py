@@ -3,7 +3,6 @@
 The meaning of colours is that of nav2_map_server (ros-navigation/navigation2, nav2_map_server/src/map_io.cpp).
 """
 
-import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.errors import LogError, brief
+from navirl_cli.logs.map_geometry import LEAST_M, MOST_M, check_geometry, is_place, is_resolution
 from navirl_cli.logs.recording import Occupancy
 from navirl_cli.logs.yaml_file import read_mapping
 
@@ -38,10 +38,15 @@ def _is_share(value: Any) -> bool:
 #: By key: the expected value, and whether a value is as expected.
 _KEYS: Final[dict[str, tuple[str, Callable[[Any], bool]]]] = {
     "image": ("the name of a pgm, png or bmp file", lambda value: isinstance(value, str) and value != ""),
-    "resolution": ("m a cell, above 0", lambda value: _is_number(value) and value > 0),
+    "resolution": (
+        f"m a cell, from {LEAST_M:g} to {MOST_M:g}",
+        lambda value: _is_number(value) and is_resolution(value),
+    ),
     "origin": (
         "[x, y, yaw] in m, m and rad",
-        lambda value: isinstance(value, list) and len(value) == 3 and all(map(_is_number, value)),
+        lambda value: (
+            isinstance(value, list) and len(value) == 3 and all(map(_is_number, value)) and all(map(is_place, value))
+        ),
     ),
     "negate": ("0 or 1", lambda value: isinstance(value, int)),
     "occupied_thresh": ("a number from 0 to 1", _is_share),
@@ -79,11 +84,7 @@ def read_map(path: Path) -> Occupancy:
         if key not in document or not fits(document[key]):
             raise LogError(f"{path}: key {key}: expected {expected}, found {found}; {_REMEDY}")
     x, y, yaw = document["origin"]
-    if abs(math.sin(yaw / 2)) > 1e-6:
-        raise LogError(
-            f"{path}: key origin: expected a map whose cells run along its frame's axes, found one rotated by "
-            f"{math.degrees(yaw):.1f} degrees; save the map with an origin of yaw 0"
-        )
+    check_geometry(f"{path}: key origin", float(document["resolution"]), (x, y), yaw, _REMEDY)
     cells = _picture(path, document["image"], _colours(path, document))
     return Occupancy(cells[::-1].copy(), float(document["resolution"]), (float(x), float(y)))
 

@@ -3,6 +3,7 @@
 The tables come from indexes, and from the first messages where indexes do not suffice.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.arrays import IntArray
-from navirl_cli.logs.container.batches import Batch, Channel
+from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
@@ -20,9 +21,11 @@ from navirl_cli.logs.findings import Severity
 from navirl_cli.logs.load import Line, LoadOptions, follow
 from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times
+from navirl_cli.logs.messages.reader import check as check_messages
 from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
+from navirl_cli.logs.roles.receipts import wrong_receipts
 from navirl_cli.logs.roles.topics import Choice, Topic, is_missing, topics_of
 from navirl_cli.logs.sources import Source
 
@@ -121,13 +124,19 @@ class Overview:
 
 
 def overview(
-    source: Source, requested: Mapping[str, Sequence[str]], *, check: bool = False, progress: Progress | None = None
+    source: Source,
+    requested: Mapping[str, Sequence[str]],
+    namespace: str | None = None,
+    *,
+    check: bool = False,
+    progress: Progress | None = None,
 ) -> Overview:
     """What is in a recording.
 
     Args:
         source: Its files.
         requested: Names of topics by role, where the user named some.
+        namespace: Of the robot, where the user named it.
         check: Read every message, so that damage inside of chunks shows too.
         progress: Called with bytes done and bytes in all.
 
@@ -138,37 +147,56 @@ def overview(
         files = [stack.enter_context(open_log(path)) for path in source.files]
         timed = [message_times(file) for file in files]
         contents = tuple(one for one, _ in timed)
-        line = follow(source, files, contents, LoadOptions(topics=requested), None if check else progress)
+        line = follow(
+            source, files, contents, LoadOptions(topics=requested, namespace=namespace), None if check else progress
+        )
         stamped = _first_messages(files)
         damage = _all_damage(files, progress) if check else [note for one in contents for note in one.damage]
-    starts = [one.start_ns for one in contents if one.start_ns is not None]
-    ends = [one.end_ns for one in contents if one.end_ns is not None]
+    received = _received(timed, line)
+    start_ns = min((int(times[0]) for times in received.values() if len(times)), default=None)
     return Overview(
         source,
         contents,
-        min(starts, default=None),
-        max(ends, default=None),
-        _flows(timed, min(starts, default=0), stamped),
+        start_ns,
+        max((int(times[-1]) for times in received.values() if len(times)), default=None),
+        _flows(contents, received, start_ns or 0, stamped),
         line,
         tuple(dict.fromkeys((*map(str, (*source.damage, *damage)), *line.lost))),
     )
 
 
-def _flows(
-    timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], start_ns: int, stamped: Mapping[_Key, Stamped]
-) -> tuple[Flow, ...]:
-    """When the messages of each topic came in, by the times of receipt of each file's channels."""
-    times: dict[_Key, list[IntArray]] = {}
-    encodings: dict[_Key, str] = {}
+def _received(timed: Sequence[tuple[Contents, Mapping[int, IntArray]]], line: Line) -> dict[_Key, IntArray]:
+    """By topic and type (n,) ns of receipt, ascending, without those that cannot be true, and without steps of clocks.
+
+    Where the recorder's clock stepped, other topics than those of extract count only within the times of these.
+    """
+    by_key: dict[_Key, list[IntArray]] = {}
     for one, by_channel in timed:
         for channel in one.channels:
-            key = _key(channel)
-            times.setdefault(key, []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
-            encodings[key] = channel.message_encoding
-    topics = {(topic.name, topic.type_name): topic for topic in topics_of(one for one, _ in timed)}
+            by_key.setdefault(_key(channel), []).append(by_channel.get(channel.id, np.zeros(0, dtype=np.int64)))
+    received = {key: np.sort(np.concatenate(times)) for key, times in by_key.items()}
+    known = line.timed.received_ns if line.timed and line.timed.repaired else {}
+    if known:
+        first, last = min(int(times[0]) for times in known.values()), max(int(times[-1]) for times in known.values())
+        within = {key: times[(times >= first) & (times <= last)] for key, times in received.items()}
+        types = Counter(topic for topic, _ in received)
+        return {key: known.get(key[0], times) if types[key[0]] == 1 else times for key, times in within.items()}
+    wrong = wrong_receipts(np.concatenate([np.zeros(0, dtype=np.int64), *received.values()]))
+    if wrong.all():
+        return received
+    parts = np.split(wrong, np.cumsum([len(times) for times in received.values()]))
+    return {key: times[~part] for (key, times), part in zip(received.items(), parts, strict=False)}
+
+
+def _flows(
+    contents: Sequence[Contents], received: Mapping[_Key, IntArray], start_ns: int, stamped: Mapping[_Key, Stamped]
+) -> tuple[Flow, ...]:
+    """When the messages of each topic came in, by the times of receipt by topic."""
+    encodings = {_key(channel): channel.message_encoding for one in contents for channel in one.channels}
     return tuple(
-        _flow(topic, encodings[key], np.sort(np.concatenate(times[key])), start_ns, stamped.get(key))
-        for key, topic in topics.items()
+        _flow(topic, encodings[key], received[key], start_ns, stamped.get(key))
+        for topic in topics_of(contents)
+        for key in [(topic.name, topic.type_name)]
     )
 
 
@@ -263,15 +291,12 @@ def _all_damage(files: Sequence[RawFile], progress: Progress | None) -> list[Dam
     total = sum(file.size for file in files)
     notes: list[Damage] = []
     done = 0
-    for path in files:
-        with LogFile(path) as log:
-            for _ in log.results(lambda _: True, _count, threads_here()):
-                if progress is not None:
-                    progress(done + log.position, total)
-            notes += log.damage
-        done += path.size
+    for file in files:
+
+        def report(share: float, done: int = done, size: int = file.size) -> None:
+            if progress is not None:
+                progress(done + round(share * size), total)
+
+        notes += check_messages(file, report, threads_here())
+        done += file.size
     return notes
-
-
-def _count(batch: Batch) -> int:
-    return len(batch.starts)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import LogError
+from navirl_cli.logs.occupancy import MapHistory
+from navirl_cli.logs.occupancy import Occupancy as Occupancy  # noqa: PLC0414 which others import from here
 
 #: Name of the metadata record with what only the experimenter knows. Its keys: "participant", a name; and in JSON
 #: "trials", a list of objects with "t_ns", the time of the trial's goal or start, and any of "stop_ns", "participant",
@@ -30,17 +32,6 @@ class Wrench(ByContent):
     #: (3, 3) rotation that turns a vector of the sensor frame into the robot's base frame; (n, 3, 3), one for each
     #: measurement, where the sensor moves on the robot.
     to_base: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Occupancy(ByContent):
-    """A map as nav_msgs/OccupancyGrid holds it."""
-
-    #: (rows, columns) -1 unknown, 0..100 per cent; row 0 has the lowest y.
-    data: NDArray[np.int8]
-    resolution_m: float
-    #: Lower left corner, (x, y) m, fixed frame.
-    origin_m: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +113,7 @@ class Recording:
     xy_m: FloatArray
     yaw_rad: FloatArray
     wrench: Wrench | None
+    #: The only map, or the last one.
     occupancy: Occupancy
     #: (g,) ns and (g, 2) m, fixed frame.
     goal_t_ns: IntArray
@@ -136,6 +128,12 @@ class Recording:
     #: (n, 2) m/s forward and to the left, base frame, at the poses' times; None where the odometry has none.
     velocity_m_s: FloatArray | None = None
     jumps: tuple[Jump, ...] = ()
+    #: All maps, where there are several.
+    maps: MapHistory | None = None
+    #: (u,) ns of odometry that tf does not place.
+    unplaced_ns: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    #: First and last time of anything that was measured, ns; None: those of the poses.
+    measured_ns: tuple[int, int] | None = None
     #: Why there is no goal where there is none, as far as it is known: "1 messages on /goal_pose left out: ...".
     no_goal: str = ""
     #: What could not be read, in words.
@@ -175,3 +173,10 @@ class Recording:
         if self.no_goal:
             return f"{self.log}: trials cannot be split at goals, because no goal is left: {self.no_goal}; or {remedy}"
         return f"{self.log}: no goal is announced, so that trials cannot be split at goals; {remedy}"
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """First and last time at which anything was measured, ns."""
+        first, last = int(self.t_ns[0]), int(self.t_ns[-1])
+        given = self.measured_ns or (first, last)
+        return min(given[0], first), max(given[1], last)

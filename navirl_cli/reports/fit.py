@@ -18,6 +18,7 @@ from navirl_cli.irl.reward import parameters_of, terms_with
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter
 from navirl_cli.irl.uncertainty import condition_number, correlation
+from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
 FEW = 10
@@ -316,8 +317,8 @@ def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
 
 
 def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """Choices that the user may not have intended."""
-    lines = []
+    """Choices that the user may not have intended, and what extraction found unusual."""
+    lines = repeated(chosen)
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(

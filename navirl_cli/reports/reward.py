@@ -32,6 +32,7 @@ from navirl_cli.reports.fit import (
     validation_tables,
     warnings,
 )
+from navirl_cli.reports.repeated import repeated
 
 _FORMULA = (
     "The reward of a step from s to s' is `c0 |s - s'| + a_g d(s)^2 + sum_p a_p exp(-sigma_p |s - s_p|^2)`. The sum is "
@@ -71,7 +72,7 @@ def report_of(
         made_from: Files and hashes.
         seed: Of the intervals.
     """
-    notes = [f"{one.id}: {note}" for one in demonstrations for note in one.notes]
+    notes = repeated(demonstrations)
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
         *_warnings(content, ranks),

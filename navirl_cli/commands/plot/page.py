@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.commands import completion
-from navirl_cli.commands.shared import force_option, output_option, say
+from navirl_cli.commands.shared import check_output, force_option, output_option, say
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
-from navirl_cli.files import check_writable
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -81,7 +80,8 @@ def page_options(function: Function) -> Function:
 
     @wraps(function)
     def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
-        check_writable(output, force=force)
+        given = (path for value in others.values() for path in (value if isinstance(value, tuple) else (value,)))
+        check_output(output, [path for path in given if isinstance(path, Path)], force=force)
         return function(page=Page(output, wide, style, force), **others)
 
     figure_options = section(

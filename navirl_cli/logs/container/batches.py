@@ -39,11 +39,6 @@ class Batch:
     #: Place of each message in the file's order, shape (n,); only comparable within one file.
     order: IntArray
 
-    def newest(self) -> "Batch":
-        """The batch of the message that was received last."""
-        row = slice(at := len(self.log_time_ns) - 1 - int(self.log_time_ns[::-1].argmax()), at + 1)
-        return Batch(self.channel, self.raw, self.starts[row], self.sizes[row], self.log_time_ns[row], self.order[row])
-
     def payload(self, number: int) -> bytes:
         """A copy of one payload, which does not keep the block in memory."""
         start = int(self.starts[number])

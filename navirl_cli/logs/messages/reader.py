@@ -1,9 +1,11 @@
 """Reading logs: the contents of a file, and its messages as columns."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Batch, Channel
@@ -11,6 +13,7 @@ from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
 from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.messages.decode import DecodedBatch
+from navirl_cli.logs.messages.packing import Packer
 from navirl_cli.logs.messages.schema import full_name
 from navirl_cli.logs.messages.series import Series, SeriesBuilder
 
@@ -106,7 +109,7 @@ def read(
     wants: Wants,
     progress: Progress | None = None,
     threads: int | None = None,
-    latest: Collection[TopicKey] = (),
+    packed: Collection[TopicKey] = (),
 ) -> ReadResult:
     """Read topics from one or several files.
 
@@ -116,7 +119,8 @@ def read(
             "poses[].position.x", which become columns.
         progress: Called with the bytes done and the bytes of all files.
         threads: Number of threads that decompress and decode; by default one for each core, four at most.
-        latest: Topics of which only the message received last is wanted, such as maps that are sent repeatedly.
+        packed: Topics whose sequences are int8 and are kept compressed by zlib, one object of bytes a message, such as
+            maps that are sent repeatedly.
 
     Returns:
         A series for each wanted topic that a file has, and the damage. Damage includes channels whose encoding,
@@ -129,7 +133,8 @@ def read(
     sizes = [_size(path) for path in files]
     fields: dict[TopicKey, tuple[str, ...]] = {key: tuple(paths) for key, paths in wants.items()}
     builders: dict[TopicKey, SeriesBuilder] = {
-        key: SeriesBuilder(key if isinstance(key, str) else key[0], key in latest) for key in fields
+        key: SeriesBuilder(key if isinstance(key, str) else key[0], Packer() if key in packed else None)
+        for key in fields
     }
     damage: list[Damage] = []
     begin = 0
@@ -200,12 +205,7 @@ class _Walk:
         """Walk over a file."""
         for decoded, count in log.results(self.wanted, self.decoded, threads):
             self.seen[decoded.channel.id] += count
-            key = self.key(decoded.channel)
-            batches = self.batches[key]
-            batches.append(decoded)
-            if self.builders[key].latest:
-                filled = [one for one in batches if len(one.order)]
-                batches[:] = sorted(filled, key=lambda one: int(one.log_time_ns.max()))[-1:] or batches
+            self.batches[self.key(decoded.channel)].append(decoded)
             progress(log.position / log.size)
         for channel in log.channels:
             self.wanted(channel)
@@ -223,9 +223,9 @@ class _Walk:
     def decoded(self, batch: Batch) -> tuple[DecodedBatch, int]:
         """A batch's columns, and its number of messages; in any thread."""
         builder = self.builders[self.key(batch.channel)]
-        decoder = builder.decoders[batch.channel]
-        newest = decoder.decode(batch.newest()) if builder.latest else None
-        decoded = newest if newest is not None and len(newest.order) else decoder.decode(batch)
+        decoded = builder.decoders[batch.channel].decode(batch)
+        if builder.packer is not None:
+            decoded = builder.packer.packed(decoded)
         return decoded, len(batch.starts)
 
     def undecodable(self, log: LogFile) -> list[str]:
@@ -234,15 +234,65 @@ class _Walk:
         return [text for number, text in self.unusable.items() if counted is None or counted.get(number)]
 
     def missing(self, log: LogFile) -> list[str]:
-        """The channels of which the statistics count more messages than were found and than are known to be lost."""
-        counted = _counted(log) or {}
-        return [
-            f"the statistics count {count} messages of {channel.topic}, {self.seen[channel.id]} were found"
-            for channel in log.channels
-            if self.key(channel) in self.builders
-            and channel.id not in self.unusable
-            and (count := counted.get(channel.id, 0)) > self.seen[channel.id] + log.lost.get(channel.id, 0)
-        ]
+        """The wanted channels of which messages are missing."""
+        wanted = [one for one in log.channels if self.key(one) in self.builders and one.id not in self.unusable]
+        return _missing(log, wanted, self.seen)
+
+
+def check(path: Log, progress: Callable[[float], None] | None = None, threads: int | None = None) -> list[Damage]:
+    """Read every message of a file, by the same rule as `read`, and hold message indexes against the messages.
+
+    Args:
+        path: An MCAP file.
+        progress: Called with the share that is done.
+        threads: Number of threads that decompress; by default one for each core, four at most.
+
+    Returns:
+        Its damage.
+
+    Raises:
+        LogError: It is not an MCAP file.
+    """
+    with LogFile(path) as log:
+        listed = log.times()
+    for trust_indexes in (True, False):
+        with LogFile(path, trust_indexes=trust_indexes) as log:
+            times: dict[int, list[IntArray]] = {}
+            results = log.results(
+                lambda _: True, lambda one: (one.channel.id, one.log_time_ns), threads or threads_here()
+            )
+            for number, some in results:
+                times.setdefault(number, []).append(some)
+                if progress is not None:
+                    progress(log.position / log.size)
+            found = {number: np.sort(np.concatenate(several)) for number, several in times.items()}
+            missing = _missing(log, log.channels, {number: len(some) for number, some in found.items()})
+            wrong = [
+                f"the message indexes give other times of receipt of {channel.topic} than its messages"
+                for channel in log.channels
+                if channel.id in found
+                and channel.id in listed
+                and len(found[channel.id]) == len(listed[channel.id])
+                and not np.array_equal(found[channel.id], listed[channel.id])
+            ]
+            damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in (*missing, *wrong))]
+        if not missing:
+            break
+    return damage
+
+
+def _receipts(batch: Batch) -> tuple[int, IntArray]:
+    return batch.channel.id, batch.log_time_ns
+
+
+def _missing(log: LogFile, channels: Iterable[Channel], seen: Mapping[int, int]) -> list[str]:
+    """The channels of which the statistics count more messages than were found and than are known to be lost."""
+    counted = _counted(log) or {}
+    return [
+        f"the statistics count {count} messages of {channel.topic}, {seen.get(channel.id, 0)} were found"
+        for channel in channels
+        if (count := counted.get(channel.id, 0)) > seen.get(channel.id, 0) + log.lost.get(channel.id, 0)
+    ]
 
 
 def _counted(log: LogFile) -> Mapping[int, int] | None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.messages.decode import Columns, DecodedBatch, Decoder, empty_column
+from navirl_cli.logs.messages.packing import Packer
 from navirl_cli.logs.messages.schema import Schema, SchemaError, parse_definition
 
 
@@ -26,7 +27,7 @@ class Series:
     order: IntArray
     #: By wanted field: numbers of the field's own type, shape (n,), or (n, k) for a fixed array of k; times as int64
     #: ns; texts as an object array of str. A field in a sequence, "poses[].position.x", holds the entries of all
-    #: messages one after the other, shape (total,).
+    #: messages one after the other, shape (total,); where sequences are packed, one object of bytes a message.
     columns: dict[str, NDArray[Any]]
     #: By sequence, "poses[]": number of entries of each message, shape (n,).
     counts: dict[str, IntArray]
@@ -45,8 +46,8 @@ class SeriesBuilder:
     """Joins the batches of one topic to a series."""
 
     topic: str
-    #: Whether only the message received last is kept.
-    latest: bool = False
+    #: What compresses its sequences; None where they become columns.
+    packer: Packer | None = None
     schema_name: str = ""
     #: By channel; channels of several files with the same definition are one.
     decoders: dict[Channel, Decoder] = field(default_factory=dict)
@@ -83,10 +84,6 @@ class SeriesBuilder:
     def add(self, batches: list[DecodedBatch], begin: int) -> None:
         """Add the batches of a file, whose messages begin at this place of the order of all files."""
         self.files.append((begin, batches))
-        if self.latest:
-            filled = [(start, batch) for start, file in self.files for batch in file if len(batch.order)]
-            newest = [max(filled, key=lambda one: int(one[1].log_time_ns.max()))] if filled else []
-            self.files = [(start, [batch]) for start, batch in newest]
 
     def series(self) -> Series:
         """The series; the batches are consumed."""
@@ -96,8 +93,6 @@ class SeriesBuilder:
         times = _joined([batch.log_time_ns for batch in batches])
         order = _joined([begin + batch.order for begin, batch in filled])
         rows = self._rows(times, order)
-        if self.latest and len(times):
-            rows = np.arange(len(times))[-1:] if rows is None else rows[-1:]
         leaves = next(iter(self.decoders.values())).leaves
         counts = {}
         for sequence in {leaf.sequence for leaf in leaves.values() if leaf.sequence}:
@@ -106,7 +101,8 @@ class SeriesBuilder:
         for path, leaf in leaves.items():
             column = np.concatenate([batch.columns.pop(path) for batch in batches] or [empty_column(leaf, 0)])
             if rows is not None:
-                column = column[rows if leaf.sequence is None else _entries(counts[leaf.sequence], rows)]
+                by_message = leaf.sequence is None or self.packer is not None
+                column = column[rows if by_message else _entries(counts[leaf.sequence or ""], rows)]
             columns[path] = column
         if rows is not None:
             times, order = times[rows], order[rows]

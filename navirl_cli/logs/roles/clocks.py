@@ -1,8 +1,9 @@
 """When a message was measured, on one clock for the whole recording.
 
 A header's stamp is the time of the measurement; a message without a stamp has its time of receipt. The clock of a
-recording is that of its odometry's stamps. It may be simulated, belong to another computer than the recorder's, and
-jump. Where another topic is stamped by another clock, the times of receipt give the offset between the two.
+recording is that of its odometry's stamps. It may be simulated, and belong to another computer than the recorder's.
+Where another topic is stamped by another clock, the times of receipt give the offset between the two. Steps of clocks
+are taken out before (:mod:`~navirl_cli.logs.roles.steps`).
 """
 
 from dataclasses import dataclass, field
@@ -15,8 +16,8 @@ from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.logs.findings import Finding, Kind
 
 NS_PER_S = 1_000_000_000
-#: A clock that moves by more than this against the recorder's between two messages has jumped, s.
-JUMP_S = 1.0
+#: Single stamps that are farther than this from the expected time are wrong, s.
+WILD_S = 1.0
 #: Stamps farther than this from the expected time belong to another clock, s: no robot's messages take so long.
 APART_S = 0.25
 #: Stamps that drift by more than this until the end belong to another clock too, s. An offset that changes by less than
@@ -24,6 +25,8 @@ APART_S = 0.25
 _DRIFT_S, _CONSTANT_S = 0.1, 0.02
 #: The offset of another clock is estimated from at least this many messages.
 _MIN_MESSAGES = 20
+#: The longest time by which a localisation stamps its transforms ahead on purpose, s.
+_TOLERANCE_S = 2.0
 #: Widths of medians over offsets, messages: against single wrong stamps, and against the time that messages take. The
 #: second is also a time in s, because a recorder's disk stalls all topics at once.
 _OUTLIERS, _LATENCY, _LATENCY_S = 5, 51, 2.0
@@ -79,7 +82,6 @@ class Clock:
                 self.findings.append(Finding(Kind.NO_STAMPS, self.reference.topic))
         #: Offset at the first stamp, ns. Later offsets are relative to it, so that floats hold them.
         self._base_ns = 0
-        self._shifts_ns = np.zeros(1, dtype=np.int64)
         self._at_ns = log_ns[stamped[:1]] if self.source is TimeSource.HEADER else np.zeros(1, dtype=np.int64)
         self._offset_s = np.zeros(1)
         if self.source is TimeSource.HEADER:
@@ -102,73 +104,77 @@ class Clock:
         """Times of messages on this clock, (n,) ns; what is unusual about them is noted."""
         if self.source is TimeSource.LOG:
             return one.log_ns.copy()
-        expected = self._expected(one.log_ns)
+        expected = self.expected(one.log_ns)
         if one.stamp_ns is None:
             return expected
         stamped = one.stamp_ns != 0
         if not stamped.all():
             self.findings.append(Finding(Kind.UNSTAMPED, one.topic, int((~stamped).sum())))
-        times = np.where(stamped, self.shifted(one.stamp_ns, one.log_ns), expected)
+        times = np.where(stamped, one.stamp_ns, expected)
         if one.topic != self.reference.topic:
-            times = times - np.where(stamped, self._apart(one, _seconds(times - expected), stamped), 0)
+            times = times - np.where(stamped, self.apart(one), 0)
         away = _seconds(times - expected)
-        wild = stamped & (np.abs(away) > JUMP_S) & ~_received_wrongly(times, one.log_ns, away)
+        wild = stamped & (np.abs(away) > WILD_S) & ~_received_wrongly(times, one.log_ns, away)
         if self._at_ns[0] == self._at_ns[-1]:  # some converters give all messages one time of receipt
             wild[:] = False
         if wild.any() and (one.momentary or len(times) >= _MIN_MESSAGES):
-            self.findings.append(Finding(Kind.WILD_STAMPS, one.topic, int(wild.sum()), JUMP_S))
+            self.findings.append(Finding(Kind.WILD_STAMPS, one.topic, int(wild.sum()), WILD_S))
             times = np.where(wild, expected, times)
         return times
 
-    def shifted(self, stamp_ns: IntArray, log_ns: IntArray) -> IntArray:
-        """Stamps (n,) ns, moved over the clock's jumps by their times of receipt; stamps of 0 stay."""
-        if self.source is TimeSource.LOG:
-            return log_ns
-        if len(self._shifts_ns) == 1:
-            return stamp_ns
-        candidates = stamp_ns[:, None] + self._shifts_ns
-        best = np.abs(candidates - self._expected(log_ns)[:, None]).argmin(axis=1)
-        moved: IntArray = candidates[np.arange(len(stamp_ns)), best]
-        return np.where(stamp_ns == 0, 0, moved)
+    def nearest(self, one: Stamped, shifts_ns: IntArray) -> IntArray:
+        """Which of some shifts of the stamps brings each nearest to its receipt, (n,) ns.
+
+        A stamp that none of them brings near, such as that of a map that was sent before the recording, is not shifted.
+        """
+        none = np.zeros(len(one.log_ns), dtype=np.int64)
+        if one.stamp_ns is None or self.source is TimeSource.LOG:
+            return none
+        away = np.abs(_seconds(one.stamp_ns[:, None] + shifts_ns - self.expected(one.log_ns)[:, None]))
+        best = away.argmin(axis=1)
+        return np.where((away.min(axis=1) <= WILD_S) & (one.stamp_ns != 0), shifts_ns[best], none)
 
     def _follow(self, log_ns: IntArray, stamp_ns: IntArray) -> None:
-        """Find jumps, and the offset between them."""
+        """Find the offset over time."""
         offset_ns = stamp_ns - log_ns
         self._base_ns = int(np.sort(offset_ns[:_OUTLIERS])[len(offset_ns[:_OUTLIERS]) // 2])
-        steady, jumped = _steady(_seconds(offset_ns - self._base_ns), log_ns)
-        jumps = np.flatnonzero(np.diff(jumped))
-        self._shifts_ns = np.round(-jumped[np.r_[0, jumps + 1]] * NS_PER_S).astype(np.int64)
+        steady = running_median(_seconds(offset_ns - self._base_ns))
         self._at_ns = log_ns
-        self._offset_s = _smooth(steady - jumped, _seconds(log_ns - log_ns[0]))
-        for row in jumps.tolist():
-            at_s = (int(log_ns[row]) - int(log_ns[0])) / NS_PER_S
-            size = float(jumped[row + 1] - jumped[row])
-            self.findings.append(Finding(Kind.CLOCK_STEP, "the clock", size=size, at_s=at_s))
+        self._offset_s = _smooth(steady, _seconds(log_ns - log_ns[0]))
 
-    def _expected(self, log_ns: IntArray) -> IntArray:
+    def expected(self, log_ns: IntArray) -> IntArray:
         """The clock's time when messages are received, (n,) ns."""
         first = int(self._at_ns[0])
         # differences first: nanoseconds since 1970 do not fit into a float
         at_s, known_s = _seconds(log_ns - first), _seconds(self._at_ns - first)
-        rate = (self._offset_s[-1] - self._offset_s[0]) / max(known_s[-1], JUMP_S)
+        rate = (self._offset_s[-1] - self._offset_s[0]) / max(known_s[-1], WILD_S)
         beyond_s = at_s - np.clip(at_s, 0.0, known_s[-1])
         offset_s = np.interp(at_s, known_s, self._offset_s) + rate * beyond_s
         shown: IntArray = log_ns + self._base_ns + np.round(offset_s * NS_PER_S).astype(np.int64)
         return shown
 
-    def _apart(self, one: Stamped, away_s: FloatArray, stamped: BoolArray) -> IntArray:
-        """Offset of another clock's stamps from this clock, (n,) ns; 0 where it is the same clock."""
-        rows = np.flatnonzero(stamped)
-        none = np.zeros(len(away_s), dtype=np.int64)
-        if rows.size < _MIN_MESSAGES:
+    def apart(self, one: Stamped, *, ahead: bool = False) -> IntArray:
+        """Offset of another clock's stamps from this clock, (n,) ns; 0 where it is the same clock. Else it is noted.
+
+        Args:
+            one: Its times.
+            ahead: Whether it may be stamped ahead on purpose, as transforms are.
+        """
+        none = np.zeros(len(one.log_ns), dtype=np.int64)
+        rows = np.flatnonzero(none if one.stamp_ns is None else one.stamp_ns)
+        if rows.size < _MIN_MESSAGES or one.stamp_ns is None or self.source is TimeSource.LOG:
             return none
         at_s = _seconds(one.log_ns - one.log_ns[0])
-        steady, jumped = _steady(away_s[rows], one.log_ns[rows])
-        steady = jumped + _smooth(steady - jumped, at_s[rows])
+        away_s = _seconds(one.stamp_ns - self.expected(one.log_ns))
+        in_time = rows[~_late(away_s[rows], at_s[rows])]
+        rows = in_time if in_time.size >= _MIN_MESSAGES else rows
+        steady = _smooth(running_median(away_s[rows]), at_s[rows])
         middle, change = float(np.median(steady)), float(steady[-1] - steady[0])
         if abs(middle) <= APART_S and abs(change) <= _DRIFT_S:
             return none
         kind = Kind.DRIFTING_CLOCK if abs(change) > _DRIFT_S else Kind.OTHER_CLOCK
+        if ahead and abs(change) <= _DRIFT_S and 0 < middle <= _TOLERANCE_S:
+            kind = Kind.STAMPED_AHEAD
         than = self.reference.topic
         self.findings.append(Finding(kind, one.topic, size=middle, change=change, detail=than))
         apart = np.interp(at_s, at_s[rows], steady) if np.ptp(steady) > _CONSTANT_S else np.full(len(away_s), middle)
@@ -177,6 +183,20 @@ class Clock:
 
 def _seconds(ns: IntArray) -> FloatArray:
     return ns.astype(np.float64) / NS_PER_S
+
+
+def _late(away_s: FloatArray, at_s: FloatArray) -> BoolArray:
+    """(n,) which messages were received late, because others within some seconds were not.
+
+    Args:
+        away_s: (n,) s, stamps - expected times at their receipt.
+        at_s: (n,) s of receipt, ascending.
+    """
+    numbers, starts = np.unique(np.floor(at_s / _LATENCY_S), return_index=True)
+    highest = np.pad(np.maximum.reduceat(away_s, starts), 1, constant_values=-np.inf)
+    near = np.max([highest[:-2], highest[1:-1], highest[2:]], axis=0)
+    late: BoolArray = np.repeat(near, np.diff(np.append(starts, len(at_s)))) - away_s > APART_S
+    return late if len(numbers) > 1 else np.zeros(len(at_s), dtype=np.bool_)
 
 
 def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) -> BoolArray:
@@ -191,7 +211,7 @@ def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) 
         (n,) True where a time is too old, but in order among the others, because the recorder stalled; and where a time
         lies among the others, but its receipt on another day.
     """
-    near = np.flatnonzero(np.abs(away_s) <= JUMP_S)
+    near = np.flatnonzero(np.abs(away_s) <= WILD_S)
     if not near.size:
         return np.zeros(len(times_ns), dtype=np.bool_)
     following = np.searchsorted(near, np.arange(len(times_ns)))
@@ -205,16 +225,7 @@ def _received_wrongly(times_ns: IntArray, log_ns: IntArray, away_s: FloatArray) 
     return wrongly
 
 
-def _steady(offset_s: FloatArray, log_ns: IntArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) s, the offset of a clock without single wrong values; and (n,) s, the sum of its jumps until then."""
-    steady = _running_median(offset_s)
-    steps = np.diff(steady, prepend=steady[:1])
-    # a slow simulation cannot shift the offset by more than the time between two messages
-    jumps = np.abs(steps) > JUMP_S + _seconds(np.diff(log_ns, prepend=log_ns[:1]))
-    return steady, np.cumsum(np.where(jumps, steps, 0.0))
-
-
-def _running_median(values: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
+def running_median(values: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
     """(n,) medians over five neighbours, against single wrong values.
 
     Args:
@@ -239,7 +250,7 @@ def _smooth(values: FloatArray, at_s: FloatArray) -> FloatArray:
     count = max(1, min(-(-len(values) // _LATENCY), int((at_s[-1] - at_s[0]) / _LATENCY_S)))
     # in time, not in rows: the clock continues across a gap
     middles, first = np.unique(_block_medians(at_s, count), return_index=True)
-    medians = _running_median(_block_medians(values, count)[first], "odd")
+    medians = running_median(_block_medians(values, count)[first], "odd")
     if len(middles) > 1:  # the ends continue as their neighbours do
         apart = np.diff(middles)[[0, -1]]
         beyond = np.clip(at_s[[0, -1]] - middles[[0, -1]], -apart, apart)

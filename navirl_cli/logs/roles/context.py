@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import BoolArray, FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.errors import FrameError
 from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.roles.columns import Columns
@@ -27,6 +27,8 @@ class Context:
     tree: TransformTree
     #: The frame that everything is expressed in.
     fixed: str
+    #: Of the robot, where the user named it; "" otherwise.
+    namespace: str = ""
 
     def is_fixed(self, frame: str) -> bool:
         """Whether a frame is the fixed one."""
@@ -63,21 +65,36 @@ class Context:
         return placed, problem
 
     def base_frame(self, named: str) -> tuple[str, Findings]:
-        """The robot's own frame: the one that a message names, else the usual one that tf knows."""
+        """The robot's own frame: the one that a message names, else the usual one that tf knows.
+
+        Raises:
+            FrameError: tf knows the frames of several robots, and none is in the namespace.
+        """
         if named:
             return named, ()
-        for name in _BASES:
-            if name in self.tree.frames:
+        frames = self.tree.frames
+        own = f"{self.namespace.strip('/')}/" if self.namespace else ""
+        for name in (*(f"{own}{base}" for base in _BASES), *_BASES):
+            if name in frames:
                 return name, ()
+        for base in _BASES:
+            prefixed = [frame for frame in frames if frame.rpartition("/")[2] == base]
+            if len(prefixed) > 1:
+                raise FrameError(
+                    f"{self.log}: expected one robot's frame, found {', '.join(prefixed)}; choose the robot with "
+                    f"`namespace` /{prefixed[0].rpartition('/')[0]}"
+                )
+            if prefixed:
+                return prefixed[0], ()
         # a wrench that is given in it needs no transform
         return "base_link", (Finding(Kind.BASE_ASSUMED, "base_link", detail=", ".join(_BASES)),)
 
 
 def plausible(
-    columns: Columns, limits: Limits, *names: str, rotations: BoolArray | None = None
+    columns: Columns, limits: Limits, *names: str, quaternions: FloatArray | None = None
 ) -> tuple[Columns, Findings]:
     """The messages whose measurements are plausible; the others are a loss."""
-    good, findings = plausible_messages(columns.topic, columns.stacked(*names), limits, rotations)
+    good, findings = plausible_messages(columns.topic, columns.stacked(*names), limits, quaternions)
     return (columns.rows(good), findings) if findings else (columns, ())
 
 

@@ -155,6 +155,13 @@ MAPS: Final = (
     ),
 )
 
+#: Updates of a part of a map, on the topic of the map's name with "_updates".
+MAP_UPDATES: Final = MessageType(
+    "map_msgs/msg/OccupancyGridUpdate",
+    _STAMP | {"frame": "header.frame_id", "x": "x", "y": "y", "width": "width", "height": "height", "data": "data[]"},
+    "data[]",
+)
+
 _NAVIGATION: Final = _named(needed=r"navigate_(to_pose|through_poses)/_action/", preferred="to_pose")
 GOALS: Final = (
     replace(

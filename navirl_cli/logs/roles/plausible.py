@@ -7,6 +7,7 @@ import numpy as np
 
 from navirl_cli.arrays import BoolArray, FloatArray
 from navirl_cli.logs.findings import Finding, Findings, Kind
+from navirl_cli.logs.tf.rotations import are_rotations, faults, rescaled
 
 #: Measurements judged at once: memory never holds a copy of all of them.
 _BLOCK: Final = 1 << 15
@@ -32,7 +33,7 @@ PLACES: Final = Limits(1e6, 1.0, "m")
 
 
 def plausible_messages(
-    topic: str, values: FloatArray, limits: Limits, rotations: BoolArray | None = None
+    topic: str, values: FloatArray, limits: Limits, quaternions: FloatArray | None = None
 ) -> tuple[BoolArray, Findings]:
     """Which messages of a topic are plausible, and what is wrong with the others.
 
@@ -40,7 +41,7 @@ def plausible_messages(
         topic: Its name.
         values: (n, k) in order of time.
         limits: Of the quantity.
-        rotations: (n,) whether a message's quaternion is a rotation; None for messages without rotations.
+        quaternions: (n, 4) x, y, z, w; None for messages without rotations.
 
     Returns:
         (n,) False where one of the k is not finite, larger than possible, a single spike, or the result of a flipped
@@ -49,20 +50,26 @@ def plausible_messages(
     """
     impossible = _impossible(values, limits)
     good: BoolArray = np.array(~impossible.any(axis=1))
-    finite = np.isfinite(values).all(axis=1)
+    left = finite = np.isfinite(values).all(axis=1)
     found = {"not finite": ~finite}
-    if rotations is not None:
-        found["without a rotation"] = finite & ~rotations
-        good = good & rotations
-    absurd = finite & impossible.any(axis=1) & (rotations if rotations is not None else True)
+    if quaternions is not None:
+        turned = are_rotations(quaternions)
+        found |= {reason: left & rows for reason, rows in faults(quaternions).items()}
+        left, good = left & turned, good & turned
+    absurd = left & impossible.any(axis=1)
     if absurd.any():
         numbers = values[absurd][impossible[absurd]]
         example = numbers[np.abs(np.log10(np.maximum(np.abs(numbers), 1e-300))).argmax()]
         found[f"impossible, such as {example:.3g} {limits.unit}"] = absurd
     counts = [f"{int(rows.sum())} {what}" for what, rows in found.items() if rows.any()]
+    scaled = "" if quaternions is None else rescaled(quaternions[good])
+    findings = (Finding(Kind.RESCALED, topic, detail=scaled),) if scaled else ()
     if good.all():
-        return good, ()
-    return good, (Finding(Kind.IMPLAUSIBLE, topic, int((~good).sum()), detail=", ".join(counts)),)
+        return good, findings
+    return good, (
+        *findings,
+        Finding(Kind.IMPLAUSIBLE, topic, int((~good).sum()), detail=", ".join(counts)),
+    )
 
 
 def _impossible(values: FloatArray, limits: Limits) -> BoolArray:

@@ -14,7 +14,7 @@ from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.context import Context, in_one_frame, plausible
 from navirl_cli.logs.roles.plausible import PLACES
 from navirl_cli.logs.roles.times import without_repeats
-from navirl_cli.logs.tf.rotations import are_rotations, normalised
+from navirl_cli.logs.tf.rotations import normalised
 from navirl_cli.logs.tf.transforms import Transforms
 
 #: Gaps of tf that are longer are not interpolated over, ns.
@@ -51,6 +51,8 @@ class Poses:
     jumps: tuple[Jump, ...]
     #: The robot's own frame.
     base: str
+    #: (u,) ns of odometry that tf does not place.
+    unplaced_ns: IntArray
 
 
 def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings]:
@@ -74,13 +76,17 @@ def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings
             f"({count} times); two nodes seem to publish there; record one of them only, or name another topic with "
             "`topic` odometry=/name"
         )
-    rotations = are_rotations(columns.stacked(*_ROTATION))
-    columns, implausible = plausible(columns, PLACES, *_POSITION, rotations=rotations)
+    columns, implausible = plausible(columns, PLACES, *_POSITION, quaternions=columns.stacked(*_ROTATION))
     if len(columns) == 0:
-        raise LogError(f"{context.log}: topic {columns.topic}: expected poses, found none that are finite")
+        why = next((f" ({one.detail})" for one in implausible if one.detail), "")
+        raise LogError(
+            f"{context.log}: topic {columns.topic}: expected poses, found none that are finite{why}; record the "
+            "odometry again, or name another topic with `topic` odometry=/name"
+        )
     columns, repeated = without_repeats(columns)
     base, assumed = context.base_frame(str(columns["child"][0]) if "child" in columns else "")
     rows, uncovered = _covered(columns.topic, base, columns.t_ns, frame, context)
+    unplaced_ns = np.delete(columns.t_ns, rows)
     columns = columns.rows(rows)
     t_ns = columns.t_ns
     poses = Transforms(normalised(columns.stacked(*_ROTATION)), columns.stacked(*_POSITION))
@@ -97,7 +103,7 @@ def poses_of(columns: Columns | None, context: Context) -> tuple[Poses, Findings
     if velocity is not None and not (np.isfinite(velocity).all() and velocity.any()):
         velocity = None
     found = (*others, *implausible, *repeated, *assumed, *uncovered)
-    return Poses(t_ns, placed.translation_m[:, :2], placed.yaw_rad, velocity, jumps, base), found
+    return Poses(t_ns, placed.translation_m[:, :2], placed.yaw_rad, velocity, jumps, base, unplaced_ns), found
 
 
 def _from_tf(context: Context) -> tuple[Poses, Findings]:
@@ -115,11 +121,11 @@ def _from_tf(context: Context) -> tuple[Poses, Findings]:
             "odometry"
         )
     inside, lost = _in_gaps(base, t_ns, context)
-    t_ns = t_ns[~inside]
+    unplaced_ns, t_ns = t_ns[inside], t_ns[~inside]
     placed = context.tree.lookup(context.fixed, base, t_ns)
     xy = placed.translation_m[:, :2]
     found = (*assumed, *lost, Finding(Kind.POSES_FROM_TF, base))
-    return Poses(t_ns, xy, placed.yaw_rad, None, _leaps(t_ns, xy), base), found
+    return Poses(t_ns, xy, placed.yaw_rad, None, _leaps(t_ns, xy), base, unplaced_ns), found
 
 
 def _covered(topic: str, base: str, t_ns: IntArray, frame: str, context: Context) -> tuple[IntArray, Findings]:

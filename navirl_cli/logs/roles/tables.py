@@ -37,7 +37,7 @@ def read_tables(
         LogError: A file is no MCAP file.
     """
     maps = {(topic.name, topic.type_name) for topic in chosen["map"].topics} if "map" in chosen else set()
-    result = read(files, _wanted(chosen), progress, latest=maps)
+    result = read(files, _wanted(chosen), progress, packed=maps)
     tables = {role: _columns(choice, result) for role, choice in chosen.items()}
     refusals = [
         _unread(log, choice, result)

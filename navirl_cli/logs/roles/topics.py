@@ -1,7 +1,7 @@
 """Which topic of a log serves which role: by its message type and, where that leaves several, by its name."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from navirl_cli.errors import MOST_NAMES, LogError, unknown
@@ -12,6 +12,7 @@ from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_defini
 from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
+from navirl_cli.logs.roles.namespaces import is_within, of_robot, owned_tf, robots_in
 
 #: Before the list of a log's topics in a message.
 HOLDS: Final = "; the log holds "
@@ -56,6 +57,8 @@ class Role:
     remedy: str = ""
     #: Whether nothing can be extracted without it.
     needed: bool = False
+    #: Types of topics that belong to a chosen one, by what their name has behind its name.
+    companions: Mapping[str, MessageType] = field(default_factory=dict, hash=False)
     #: Whether topics of a preferred type are taken alone; otherwise topics of all types serve together.
     ranked: bool = True
 
@@ -66,7 +69,8 @@ class Role:
 
     def message_type(self, topic: Topic) -> MessageType:
         """The message type of a topic, as it serves this role: where releases differ, the first that fits."""
-        named = [one for one in self.message_types if one.name == topic.type_name]
+        known = (*self.message_types, *self.companions.values())
+        named = [one for one in known if one.name == topic.type_name]
         return next((one for one in named[:-1] if topic.has(one.fields.values())), named[-1])
 
     def rank(self, topic: Topic) -> tuple[int, int] | None:
@@ -90,6 +94,8 @@ class Choice:
     problem: str = ""
     #: Whether several topics fit, of which the user must choose one.
     ambiguous: bool = False
+    #: Topics that would serve, but are another robot's.
+    foreign: tuple[Topic, ...] = ()
 
 
 ROLES: Final = (
@@ -115,6 +121,7 @@ ROLES: Final = (
         "give the map's file with `map`, or record it, usually /map; it is latched, so that ros2 bag needs its "
         "transient-local QoS override",
         needed=True,
+        companions={"_updates": message_types.MAP_UPDATES},
     ),
     Role(
         "people",
@@ -192,29 +199,91 @@ def shared_topics(topics: Iterable[Topic], chosen: Mapping[str, "Choice"]) -> Fi
     )
 
 
-def choose(log: str, topics: Sequence[Topic], requested: Mapping[str, Sequence[str]]) -> dict[str, Choice]:
+def choose(
+    log: str, topics: Sequence[Topic], requested: Mapping[str, Sequence[str]], namespace: str | None = None
+) -> dict[str, Choice]:
     """Choose the topics of every role.
 
     Args:
         log: The recording's name, for messages.
         topics: Of the recording.
         requested: Names of topics by role, where the user named some.
+        namespace: Of the robot, where the user named it: its own topics serve before those that no robot owns, and
+            those of other robots never.
 
     Returns:
         A choice for each role; a role without a topic has a problem instead.
 
     Raises:
-        LogError: A role does not exist, or a requested topic does not fit.
+        LogError: A role or the namespace does not exist, or a requested topic does not fit.
     """
     names = [role.name for role in ROLES]
     for name in requested:
         if name not in names:
             raise LogError(unknown("`topic`", name, names))
-    return {role.name: _choice(log, role, topics, requested.get(role.name, ())) for role in ROLES}
+    preferred = [{one.name for one in topics}]
+    if namespace is not None:
+        own, shared = of_robot(log, {one.name: one.type_name for one in topics}, namespace)
+        preferred = [own, shared]
+    choices = {
+        role.name: _with_companions(_choice(log, role, topics, requested.get(role.name, ()), preferred), topics)
+        for role in ROLES
+    }
+    return _with_own_tf(topics, choices, requested)
 
 
-def _choice(log: str, role: Role, topics: Sequence[Topic], requested: Sequence[str]) -> Choice:
-    """The topics of one role."""
+def _with_companions(choice: Choice, topics: Sequence[Topic]) -> Choice:
+    """A choice with the topics that belong to the chosen ones."""
+    wanted = {
+        (f"{topic.name}{ending}", message_type.name)
+        for topic in choice.topics
+        for ending, message_type in choice.role.companions.items()
+    }
+    more = [one for one in topics if one.count and (one.name, one.type_name) in wanted]
+    return replace(choice, topics=(*choice.topics, *more)) if more else choice
+
+
+def _with_own_tf(
+    topics: Sequence[Topic], choices: dict[str, Choice], requested: Mapping[str, Sequence[str]]
+) -> dict[str, Choice]:
+    """The choices without the tf topics of other robots."""
+    roles = [name for name in ("tf", "tf_static") if name not in requested]
+    tf = [topic.name for name in roles for topic in choices[name].topics]
+    references = [topic.name for name in ("odometry", "wrench", "map") for topic in choices[name].topics]
+    odometry = choices["odometry"].role
+    types = {one.name for one in odometry.message_types}
+    others = [one.name for one in topics if one.type_name in types and one.name not in references]
+    if any(choices[name].ambiguous for name in ("odometry", "wrench")):
+        return choices  # which the user must choose first
+    owned = owned_tf(tf, references, others)
+    for name in roles:
+        choice = choices[name]
+        if owned.problem and choice.topics:
+            choices[name] = Choice(choice.role, (), "", owned.problem, ambiguous=True)
+            continue
+        kept = tuple(topic for topic in choice.topics if topic.name in owned.kept)
+        foreign = tuple(topic for topic in choice.topics if topic not in kept)
+        if foreign:
+            left_out = ", ".join(topic.name for topic in foreign)
+            problem = "" if kept else f"no {name} of this robot; {left_out} is another robot's"
+            reason = f"in the namespace of odometry, wrench and map; not {left_out}" if kept else ""
+            choices[name] = Choice(choice.role, kept, reason, problem, foreign=foreign)
+    return choices
+
+
+def _choice(
+    log: str, role: Role, topics: Sequence[Topic], requested: Sequence[str], preferred: Sequence[set[str]]
+) -> Choice:
+    """The topics of one role.
+
+    Args:
+        log: The recording's name.
+        role: What is needed.
+        topics: Of the recording.
+        requested: Names of topics that the user named.
+        preferred: Sets of topics, the best first; where one holds a topic that serves, the later ones do not count.
+            tf, of which a robot has its own and shares /tf, takes from all of them.
+    """
     if requested:
         named = tuple(_requested(log, role, topics, name) for name in dict.fromkeys(requested))
         if len(named) > 1 and not role.joins:
@@ -222,20 +291,33 @@ def _choice(log: str, role: Role, topics: Sequence[Topic], requested: Sequence[s
             raise LogError(f"{log}: `topic` {role.name}: expected one topic, found {names}; choose one")
         return Choice(role, named, "named by `topic`")
     types = {one.name for one in role.message_types}
-    of_type = [topic for topic in topics if topic.type_name in types]
+    of_type = [one for one in topics if one.type_name in types and any(one.name in some for some in preferred)]
     ranks = {topic: rank for topic in of_type if topic.count and (rank := role.rank(topic)) is not None}
+    if role.name not in ("tf", "tf_static"):
+        within = ({topic: rank for topic, rank in ranks.items() if topic.name in some} for some in preferred)
+        ranks = next((some for some in within if some), {})
     if not ranks:
         return Choice(role, (), "", _problem(role, of_type))
     best = tuple(topic for topic, rank in ranks.items() if rank == min(ranks.values()))
     if len(best) > 1 and not all(role.message_type(topic).joined for topic in best):
-        names = ", ".join(topic.name for topic in best)
-        shown = ", ".join(sorted({short_name(topic.type_name) for topic in best}))
-        problem = f"several topics could be the {role.name} ({shown}): {names}"
-        return Choice(role, (), "", f"{problem}; choose one with `topic` {role.name}={best[0].name}", ambiguous=True)
+        return Choice(role, (), "", _several(role, best, topics), ambiguous=True)
     others = [topic.name for topic in ranks if topic not in best]
     skipped = [topic.name for topic in of_type if role.rule and topic.count and topic not in ranks]
     reason = f"{role.rule}; not {', '.join(others)}" if others else "the only one that fits"
     return Choice(role, best, reason + (f"; skipped by name: {', '.join(skipped)}" if skipped else ""))
+
+
+def _several(role: Role, best: Sequence[Topic], topics: Sequence[Topic]) -> str:
+    """The problem that several topics fit equally well, and how to choose one."""
+    names = ", ".join(topic.name for topic in best)
+    shown = ", ".join(sorted({short_name(topic.type_name) for topic in best}))
+    robots = robots_in({one.name: one.type_name for one in topics})
+    own = [one for one in robots if any(is_within(topic.name, one) for topic in best)]
+    robot = f", or the robot with `namespace` {own[0]}" if own else ""
+    return (
+        f"several topics could be the {role.name} ({shown}): {names}; choose one with `topic` "
+        f"{role.name}={best[0].name}{robot}"
+    )
 
 
 def _requested(log: str, role: Role, topics: Sequence[Topic], name: str) -> Topic:

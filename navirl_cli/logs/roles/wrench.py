@@ -54,8 +54,9 @@ def wrench_of(
         frame = base
     t_ns, force = columns.t_ns, columns.stacked(*_FORCE)
     try:
-        span = context.tree.span(base, frame)
-        mounted = context.tree.lookup(base, frame, t_ns[:1] if span is None else np.clip(t_ns, *span))
+        span, constant = context.tree.span(base, frame), context.tree.is_constant(base, frame)
+        times = t_ns if span is None else np.clip(t_ns, *span)
+        mounted = context.tree.lookup(base, frame, times[:1] if constant else times)
     except FrameError as error:
         raise FrameError(
             f"{context.log}: the wrench is given in frame {frame!r}: {error}; or name a frame with "
@@ -72,4 +73,4 @@ def wrench_of(
         findings.append(Finding(Kind.MISSING_AXIS, columns.topic, detail=name[1]))
     if span is not None:
         findings.append(Finding(Kind.WRENCH_MOVES, frame, detail=base))
-    return Wrench(t_ns, force, turns[0] if span is None else turns), tuple(findings)
+    return Wrench(t_ns, force, turns[0] if constant else turns), tuple(findings)

@@ -4,6 +4,7 @@ These few lines of numpy stand in place of scipy's Rotation, whose import takes 
 tests/test_rotations.py holds them to it. Source: Shoemake 1985, Animating rotation with quaternion curves, SIGGRAPH.
 """
 
+import math
 from typing import Final
 
 import numpy as np
@@ -15,16 +16,53 @@ from navirl_cli.arrays import BoolArray, FloatArray
 IDENTITY: Final = (0.0, 0.0, 0.0, 1.0)
 #: Signs of the inverse rotation's numbers.
 INVERSE: Final = np.array((-1.0, -1.0, -1.0, 1.0))
-#: Lengths that count as 1: digits may have been rounded away, but a damaged quaternion has no direction.
+#: Lengths that are normalised to 1; a quaternion of another length is damaged, or no rotation at all.
 _LENGTHS: Final = (0.9, 1.1)
+#: A length within this of 1 is a matter of rounding.
+_ROUNDING: Final = 0.01
+#: A shorter quaternion is one of zeros: a message that was never filled in.
+_ZERO: Final = 1e-6
 
 
 def are_rotations(quaternions: FloatArray) -> BoolArray:
-    """Which quaternions of shape (n, 4) are rotations, shape (n,): those of length 1, up to rounding."""
-    # clipped, because the square of a damaged number may be too large for a float
-    length = np.linalg.norm(np.clip(quaternions, -2.0, 2.0), axis=1)
+    """Which quaternions of shape (n, 4) are rotations, shape (n,): those of a length near 1."""
+    length = _lengths(quaternions)
     rotations: BoolArray = (length > _LENGTHS[0]) & (length < _LENGTHS[1])
     return rotations
+
+
+def faults(quaternions: FloatArray) -> dict[str, BoolArray]:
+    """Why some quaternions of shape (n, 4) are no rotations.
+
+    Returns:
+        By reason, as in "3 with ...": which ones, shape (n,); only reasons that occur.
+    """
+    good, length = are_rotations(quaternions), _lengths(quaternions)
+    finite: BoolArray = np.array(np.isfinite(quaternions).all(axis=1))
+    wrong = finite & ~good & (length > _ZERO)
+    example = f"{math.hypot(*quaternions[wrong][0].tolist()):.3g}" if wrong.any() else ""
+    found: dict[str, BoolArray] = {
+        "with a quaternion of zeros": finite & (length <= _ZERO),
+        f"with a quaternion of length {example}, not 1": wrong,
+        "with a quaternion that is not finite": ~finite,
+    }
+    return {reason: rows for reason, rows in found.items() if rows.any()}
+
+
+def rescaled(quaternions: FloatArray) -> str:
+    """What :func:`normalised` changes beyond rounding in rotations of shape (n, 4), in words; "" for nothing."""
+    length = _lengths(quaternions)
+    some = length[np.abs(length - 1.0) > _ROUNDING]
+    if not some.size:
+        return ""
+    return f"{some.size} quaternions have lengths from {some.min():.3f} to {some.max():.3f}, not 1; normalised"
+
+
+def _lengths(quaternions: FloatArray) -> FloatArray:
+    """Lengths, shape (n,), of which those above 2 are only known to be."""
+    # clipped, because the square of a damaged number may be too large for a float
+    length: FloatArray = np.linalg.norm(np.clip(quaternions, -2.0, 2.0), axis=1)
+    return length
 
 
 def normalised(quaternions: FloatArray) -> FloatArray:
@@ -80,6 +118,14 @@ def rotate(quaternions: FloatArray, vectors: ArrayLike) -> FloatArray:
 def matrices(quaternions: FloatArray) -> FloatArray:
     """Rotation matrices of unit quaternions of shape (n, 4), shape (n, 3, 3)."""
     return np.stack([rotate(quaternions, axis) for axis in np.eye(3)], axis=2)
+
+
+def roll_pitch_yaw(quaternions: FloatArray) -> FloatArray:
+    """Angles about the fixed axes x, y and z, in this order, of unit quaternions of shape (n, 4), rad, shape (n, 3)."""
+    turns = matrices(quaternions)
+    roll, yaw = np.arctan2(turns[:, 2, 1], turns[:, 2, 2]), np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    pitch = np.arcsin(np.clip(-turns[:, 2, 0], -1.0, 1.0))
+    return np.stack([roll, pitch, yaw], axis=1)
 
 
 def slerp(begin: FloatArray, end: FloatArray, share: FloatArray) -> FloatArray:

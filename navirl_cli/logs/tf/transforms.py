@@ -13,7 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.errors import FrameError
-from navirl_cli.logs.tf.rotations import IDENTITY, INVERSE, are_rotations, matrices, normalised, product, rotate, slerp
+from navirl_cli.logs.tf.rotations import (
+    IDENTITY,
+    INVERSE,
+    are_rotations,
+    faults,
+    matrices,
+    normalised,
+    product,
+    rescaled,
+    roll_pitch_yaw,
+    rotate,
+    slerp,
+)
 
 #: First and last time, ns.
 Span = tuple[int, int]
@@ -22,6 +34,8 @@ Span = tuple[int, int]
 ALWAYS: Final[Span] = (int(np.iinfo(np.int64).min), int(np.iinfo(np.int64).max))
 #: The origin of a frame is nearer than this, m; a damaged number may not be.
 _FARTHEST_M: Final = 1e9
+#: Fixed links that differ by less are the same, m and rad.
+_SAME: Final = 1e-4
 
 _STAMP: Final = "transforms[].header.stamp"
 _PAIR: Final = ("transforms[].header.frame_id", "transforms[].child_frame_id")
@@ -37,7 +51,7 @@ class Link:
 
     parent: str
     child: str
-    #: Stamps in ns, shape (k,), in any order; a fixed link needs one row, whose stamp is ignored.
+    #: Stamps in ns, shape (k,), in any order; of a fixed link, which may change, the times when it was sent.
     t_ns: IntArray
     #: Origin of the child in the parent, m, shape (k, 3).
     translation_m: FloatArray
@@ -97,46 +111,83 @@ class Transforms:
         return Transforms(product(self.quaternion, first.quaternion), self.apply(first.translation_m))
 
 
+@dataclass(frozen=True)
+class Faults:
+    """What is wrong with the poses between two frames."""
+
+    #: Number of poses that are ignored, by reason, as in "3 with a quaternion of zeros".
+    ignored: Mapping[str, int]
+    #: What was normalised beyond rounding, in words; "" for nothing.
+    rescaled: str
+
+    def __str__(self) -> str:
+        return ", ".join(f"{count} {reason}" for reason, count in self.ignored.items())
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """The valid poses of a child frame in its parent, in order of time."""
 
     parent: str
     child: str
-    #: Stamps in ns, strictly increasing, shape (k,); k is 1 where the link is fixed.
+    #: Stamps in ns, strictly increasing, shape (k,); where the link is fixed, the times from which a pose counts.
     t_ns: IntArray
     #: Shape (k, 3), m.
     translation_m: FloatArray
     #: Unit quaternions x, y, z, w, shape (k, 4).
     quaternion: FloatArray
+    #: Whether each pose is held until the next, and the first one also before it was sent.
     fixed: bool
 
     @classmethod
-    def of(cls, links: Sequence[Link], parent: str, child: str, *, fixed: bool, zeros: bool) -> tuple[Self | None, int]:
-        """Join links into a curve; of equal stamps, and of fixed poses, the last is used.
+    def of(
+        cls, links: Sequence[Link], parent: str, child: str, *, fixed: bool, zeros: bool
+    ) -> tuple[Self | None, "Faults"]:
+        """Join links into a curve; of equal stamps the last is used.
 
         Args:
             links: At least one.
             parent: Name of the parent frame.
             child: Name of the child frame.
-            fixed: Whether the link is fixed and its stamps are ignored.
+            fixed: Whether the link is fixed: it changes only where another pose is sent.
             zeros: Whether a stamp of 0 is valid.
 
         Returns:
-            The curve, None if no pose is valid; and the number of invalid poses.
+            The curve, None if no pose is valid; and what is wrong with the poses.
         """
         t_ns = np.concatenate([np.asarray(link.t_ns, dtype=np.int64) for link in links])
         translation = np.concatenate([np.asarray(link.translation_m, dtype=np.float64) for link in links])
         quaternion = np.concatenate([np.asarray(link.quaternion, dtype=np.float64) for link in links])
-        good = (np.abs(translation) < _FARTHEST_M).all(axis=1) & are_rotations(quaternion) & (zeros | (t_ns != 0))
-        good &= parent not in ("", child) and child != ""
+        problems = {
+            "in itself or without a name": np.full(len(t_ns), parent in ("", child) or child == ""),
+            "stamped 0 before the clock ran": np.array(~(zeros | (t_ns != 0))),
+            **faults(quaternion),
+            "with a translation that is not finite or absurd": ~(np.abs(translation) < _FARTHEST_M).all(axis=1),
+        }
+        good = are_rotations(quaternion) & ~np.any(list(problems.values()), axis=0)
+        found = Faults(_counted(problems), rescaled(quaternion[good]))
         rows = np.flatnonzero(good)
         if not rows.size:
-            return None, len(good)
-        rows = rows[-1:] if fixed else rows[np.argsort(t_ns[rows], kind="stable")]
+            return None, found
+        rows = rows[np.argsort(t_ns[rows], kind="stable")]
         rows = rows[np.append(np.diff(t_ns[rows]) > 0, True)]
-        curve = cls(parent, child, t_ns[rows], translation[rows], normalised(quaternion[rows]), fixed)
-        return curve, int((~good).sum())
+        return cls(parent, child, t_ns[rows], translation[rows], normalised(quaternion[rows]), fixed), found
+
+    @property
+    def changes(self) -> IntArray:
+        """Rows of a fixed link at which another pose begins, shape (m,); poses that are sent again change nothing."""
+        moved = np.abs(np.diff(self.translation_m, axis=0)).max(axis=1, initial=0.0) > _SAME
+        turned = np.abs((self.quaternion[1:] * self.quaternion[:-1]).sum(axis=1)) < 1.0 - _SAME**2
+        return np.flatnonzero(moved | turned) + 1 if self.fixed else np.zeros(0, dtype=np.int64)
+
+    def described(self, rows: Sequence[int]) -> list[str]:
+        """Some of the poses in words: place in m, and roll, pitch and yaw in degrees."""
+        turns = np.degrees(roll_pitch_yaw(self.quaternion[list(rows)]))
+        return [
+            f"({', '.join(f'{value:g}' for value in np.round(place, 3) + 0.0)}) m turned by "
+            f"({', '.join(f'{angle:g}' for angle in np.round(turn, 1) + 0.0)}) deg"
+            for place, turn in zip(self.translation_m[list(rows)], turns, strict=True)
+        ]
 
     @property
     def span(self) -> Span:
@@ -155,6 +206,7 @@ class Curve:
         # differences first: a float cannot resolve nanoseconds since 1970
         step = np.maximum(self.t_ns[after] - self.t_ns[rows], 1)
         share = np.where(self.t_ns[after] <= until, np.clip((times - self.t_ns[rows]) / step, 0.0, 1.0), 0.0)
+        share = np.zeros(len(times)) if self.fixed else share
         line = share[:, None]
         translation = (1.0 - line) * self.translation_m[rows] + line * self.translation_m[after]
         return Transforms(slerp(self.quaternion[rows], self.quaternion[after], share), translation)
@@ -217,7 +269,7 @@ def in_force(curves: Sequence[Curve], covers: Mapping[str, Span], times: IntArra
     Args:
         curves: Curves to p different parents.
         covers: By parent, the span of its own transforms above it, ns. Stamps outside of it do not count, unless all
-            stamps are outside.
+            stamps are outside. A fixed link counts from when it was sent, whatever is above it.
         times: Shape (n,), ns.
 
     Returns:
@@ -225,7 +277,7 @@ def in_force(curves: Sequence[Curve], covers: Mapping[str, Span], times: IntArra
     """
     if len(curves) == 1:
         return np.zeros(len(times), dtype=np.int64), np.full(len(times), ALWAYS[1])
-    spans = [covers.get(curve.parent, ALWAYS) for curve in curves]
+    spans = [ALWAYS if curve.fixed else covers.get(curve.parent, ALWAYS) for curve in curves]
     kept = [curve.t_ns[~beyond(curve.t_ns, span)] for curve, span in zip(curves, spans, strict=True)]
     stamps = kept if any(t.size for t in kept) else [curve.t_ns for curve in curves]
     padded = [np.concatenate([ALWAYS[:1], t, ALWAYS[1:]]) for t in stamps]
@@ -279,6 +331,16 @@ def links_of(columns: Mapping[str, NDArray[Any]], counts: IntArray, t_ns: IntArr
 def beyond(times: IntArray, span: Span, hold_ns: int = 0) -> BoolArray:
     """Which times lie more than `hold_ns` outside of a span, shape (n,)."""
     return (times < span[0] - hold_ns) | (times > span[1] + hold_ns)
+
+
+def _counted(problems: Mapping[str, BoolArray]) -> dict[str, int]:
+    """How many rows each problem has, each row under its first one."""
+    counts, seen = {}, np.zeros(len(next(iter(problems.values()))), dtype=np.bool_)
+    for reason, rows in problems.items():
+        if count := int((rows & ~seen).sum()):
+            counts[reason] = count
+        seen = seen | rows
+    return counts
 
 
 def _composed(steps: Steps, times: IntArray) -> Transforms:

@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 
 from navirl_cli.arrays import IntArray
 from navirl_cli.errors import FrameError
-from navirl_cli.logs.tf.transforms import ALWAYS, Chain, Curve, Link, Span, Steps, Transforms, beyond, in_force
+from navirl_cli.logs.tf.transforms import ALWAYS, Chain, Curve, Faults, Link, Span, Steps, Transforms, beyond, in_force
 
 #: How far outside of its stamps a moving transform is held constant, in ns: a few periods of a slow localisation.
 HOLD_NS: Final = 1_000_000_000
 #: A message names at most so many frames.
 _MOST_SHOWN: Final = 100
+#: An error names at most so many pairs of frames whose transforms are ignored.
+_MOST_LISTED: Final = 5
 
 
 class TransformTree:
@@ -25,14 +27,17 @@ class TransformTree:
     far from unit length. A stamp of 0 is ignored where the child also has others, because it was sent before the
     simulated clock started. Of equal stamps the last transform is used.
 
+    A fixed transform that is sent again with another value counts from when it was sent; the first one counts from the
+    beginning (unlike in tf2, which knows the last one only).
+
     A child may have several parents: its parent changes, or two publishers disagree. These rules choose between them:
 
     1. Only parents that lead to a connection of the two frames count. Where one of the frames is an ancestor of the
        other, only those that lead up to it count.
-    2. Fixed parents count only where no moving one is left; of several fixed ones the last is used.
+    2. Fixed parents count only where no moving one is left.
     3. If one parent is left, it is used at all times. If several are left, each stamp puts its parent in force until
        the next stamp of another parent, as in tf2's buffer. Before all stamps the parent with the first stamp is in
-       force; of equal stamps, the first parent by name.
+       force; of equal stamps, the first parent by name, of fixed ones the last.
     4. Unlike in tf2, stamps at which the transforms above their parent have not begun or have ended do not count,
        unless this holds for all stamps.
 
@@ -40,15 +45,15 @@ class TransformTree:
     takes over.
 
     Args:
-        static: Fixed links; of several for one child and parent the last is used.
+        static: Fixed links, with the times when they were sent.
         moving: Links over time; several for one child and parent are joined, and replace a fixed one.
     """
 
     def __init__(self, static: Iterable[Link], moving: Iterable[Link]) -> None:
         self._parents: dict[str, dict[str, Curve]] = {}
         self._children: dict[str, set[str]] = {}
-        #: Number of ignored transforms by parent and child.
-        self.ignored: dict[tuple[str, str], int] = {}
+        #: What is wrong with transforms, by parent and child; only pairs of which something is.
+        self.faults: dict[tuple[str, str], list[Faults]] = {}
         self._add(static, fixed=True)
         self._add(moving, fixed=False)
 
@@ -169,6 +174,22 @@ class TransformTree:
         more = len(self.frames) - len(seen)
         return "; ".join(trees) + (f"; {more} more frames" if more else "") or "no frames"
 
+    def is_constant(self, target: str, source: str) -> bool:
+        """Whether the transform between two frames is the same at all times: static, and never sent again otherwise.
+
+        Raises:
+            FrameError: The frames are not connected or form a cycle.
+        """
+        chains = self._chains(target, source, _times([]))
+        return bool(chains) and not any(
+            curve.changes.size or not curve.fixed for chain in chains for curve in chain.curves
+        )
+
+    def static_changes(self) -> list[Curve]:
+        """The fixed transforms that are sent again with another value, by child."""
+        curves = [curve for frame in sorted(self._parents) for curve in self._curves(frame)]
+        return [curve for curve in curves if curve.changes.size]
+
     def _add(self, links: Iterable[Link], *, fixed: bool) -> None:
         """Join the links of each pair of frames into a curve, in the order of the pairs' last links."""
         groups: dict[tuple[str, str], list[Link]] = {}
@@ -178,9 +199,9 @@ class TransformTree:
             groups[pair].append(link)
         clocked = {child for (_, child), group in groups.items() for link in group if np.any(link.t_ns)}
         for (parent, child), group in groups.items():
-            curve, ignored = Curve.of(group, parent, child, fixed=fixed, zeros=fixed or child not in clocked)
-            if ignored:
-                self.ignored[parent, child] = self.ignored.get((parent, child), 0) + ignored
+            curve, faults = Curve.of(group, parent, child, fixed=fixed, zeros=fixed or child not in clocked)
+            if faults.ignored or faults.rescaled:
+                self.faults.setdefault((parent, child), []).append(faults)
             if curve is not None:
                 self._parents.setdefault(child, {})[parent] = curve
                 self._children.setdefault(parent, set()).add(child)
@@ -250,9 +271,13 @@ class TransformTree:
                     stack.append((curve.parent, own, [*steps, (curve, until)]))
 
     def _curves(self, frame: str, leads: set[str] | None = None) -> list[Curve]:
-        """A frame's curves to the parents in `leads`: the moving ones, or else the last fixed one."""
+        """A frame's curves to the parents in `leads`: the moving ones, or else the fixed ones, the last one first."""
         curves = [curve for curve in self._parents.get(frame, {}).values() if leads is None or curve.parent in leads]
-        return sorted((curve for curve in curves if not curve.fixed), key=lambda curve: curve.parent) or curves[-1:]
+        moving = sorted((curve for curve in curves if not curve.fixed), key=lambda curve: curve.parent)
+        if moving or not curves:
+            return moving
+        # of fixed parents that were sent at one time the last counts
+        return [curves[-1], *(curve for curve in curves[-2::-1] if curve.t_ns[-1] != curves[-1].t_ns[-1])]
 
     def _above(self, frame: str) -> set[str]:
         """A frame and all its ancestors."""
@@ -261,8 +286,16 @@ class TransformTree:
     def _refuse(self, target: str, source: str) -> NoReturn:
         """Raise the error of two frames that do not connect."""
         _parents_first({frame: self._curves(frame) for frame in self._above(source) | self._above(target)})
-        alone = [frame for frame in dict.fromkeys((source, target)) if frame not in self.frames]
-        known = "; ".join([self.describe(), *(f"{frame} is in no transform" for frame in alone)])
+        named = {*self.frames, *(frame for pair in self.faults for frame in pair)}
+        alone = [frame for frame in dict.fromkeys((source, target)) if frame not in named]
+        left_out = [
+            f"{parent} -> {child} ({one})"
+            for (parent, child), some in self.faults.items()
+            for one in some
+            if one.ignored
+        ]
+        ignored = [f"ignored: {', '.join(left_out[:_MOST_LISTED])}"] if left_out else []
+        known = "; ".join([self.describe(), *ignored, *(f"{frame} is in no transform" for frame in alone)])
         raise FrameError(
             f"transform from {source!r} to {target!r}: expected connected frames, found {known}; "
             "record /tf and /tf_static of the entire run, or name other frames"
