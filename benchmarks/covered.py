@@ -119,8 +119,8 @@ def rows(count: int) -> list[Row]:
 def _rows(head: str, people: int, done: Sequence[Covered]) -> list[Row]:
     slack = 2 * 100 * np.sqrt(0.05 * 0.95 / len(done))
     low, high = BAR[0] - slack, min(100.0, BAR[1] + slack)
-    # One person has one set. Fewer than ten people are called approximate.
-    sets = [("one person", "front", True)] if people == 1 else [
+    # One person has one set. Few demonstrations and fewer than ten people are called approximate.
+    sets = [("one person", "front", False)] if people == 1 else [
         ("by participant", "front", people >= 10),
         ("as if one person", "behind", False),
     ]  # fmt: skip

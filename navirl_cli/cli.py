@@ -22,6 +22,7 @@ COMMANDS = {
     "annotate": "Write the labels of trials into a copy of a log.",
     "extract": "Turn MCAP logs into demonstrations.",
     "fit": "Learn a navigation reward from demonstrations.",
+    "models": "Compare rewards by how well they predict participants left out.",
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",
@@ -90,7 +91,9 @@ def main() -> None:
     # The matrices are sparse or small: starting the threads of a BLAS would cost more time than they save. Their number
     # is set before numpy is imported, unless the user has set it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    signal.signal(signal.SIGTERM, _terminate)
+    for number in (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup sets it
+            signal.signal(number, _terminate)
     if "_NAVIRL_COMPLETE" in os.environ:
         from navirl_cli.commands.completion import use_whole_words
 

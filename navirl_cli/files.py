@@ -101,8 +101,12 @@ def _temporary(folder: Path) -> Path:
 
 
 def _prefix() -> str:
-    """How names of temporary files of this machine begin."""
-    return f".navirl-{sha256(gethostname().encode()).hexdigest()[:8]}-"
+    """How names of temporary files of this machine begin; containers number their processes by themselves."""
+    try:
+        numbering = Path("/proc/self/ns/pid").stat().st_ino
+    except OSError:
+        numbering = 0
+    return f".navirl-{sha256(f'{gethostname()} {numbering}'.encode()).hexdigest()[:8]}-"
 
 
 def _remove_stale(folder: Path) -> None:
@@ -115,10 +119,12 @@ def _remove_stale(folder: Path) -> None:
 
 
 def _runs(process: int) -> bool:
-    """Whether a process of this machine runs."""
+    """Whether a process of this machine runs; True where that cannot be known."""
+    if os.name != "posix":  # where signal 0 ends a process
+        return True
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):
         return False
     except OSError:  # it belongs to another user
         return True
@@ -144,7 +150,8 @@ def swapped_folder(path: Path) -> Iterator[Path]:
     """
     path = path.resolve()
     with new_folder(path.parent):
-        beside = os.access(path.parent, os.W_OK) and not path.is_mount()
+        # the root of a mount cannot be renamed, and a shell would stay in the renamed folder
+        beside = os.access(path.parent, os.W_OK) and not path.is_mount() and path != Path.cwd()
         home = path.parent if beside else path
         _remove_stale(home)
         new = _temporary(home)

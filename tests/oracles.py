@@ -8,7 +8,7 @@ import heapq
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from itertools import pairwise
-from math import ceil, exp, floor, hypot, inf, log, sqrt
+from math import ceil, exp, floor, hypot, inf, isfinite, log, sqrt
 
 import numpy as np
 from scipy.special import logsumexp
@@ -141,6 +141,76 @@ def expected_visits(policy: FloatArray, start: Cell, goal: Cell) -> FloatArray:
         if mass.sum() < 1e-16:
             return visits
     raise AssertionError("mass never arrives in the goal")
+
+
+# --- turns ---------------------------------------------------------------------------------------------------------
+
+#: A cell and the move by which a path came there, None where it begins.
+Came = tuple[Cell, int | None]
+
+
+def turn_states(free: BoolArray, goal: Cell) -> list[Came]:
+    """Every cell with every move that can lead into it, and every cell as a beginning; the goal's need no moves."""
+    begun: list[Came] = [(cell, None) for cell in free_cells(free)]
+    entered: list[Came] = [
+        (target, move) for cell in free_cells(free) if cell != goal for move, target in ways(free, cell)
+    ]
+    return [*begun, *entered]
+
+
+def is_sharp(before: int | None, move: int) -> bool:
+    """Whether a move turns by 90 degrees or more: the scalar product of both moves is not positive."""
+    if before is None:
+        return False
+    (x, y), (u, v) = MOVES[before], MOVES[move]
+    return x * u + y * v <= 0
+
+
+def turn_values(reward: FloatArray, sharp: float, free: BoolArray, goal: Cell) -> dict[Came, float]:
+    """Soft values by cell and incoming move, by value iteration in the log domain.
+
+    Args:
+        reward: (rows, columns, 8) of a step without the turn.
+        sharp: Added to the reward of a step that turns sharply.
+    """
+    values = {state: 0.0 if state[0] == goal else -inf for state in turn_states(free, goal)}
+    for _ in range(2000):
+        before = dict(values)
+        for cell, came in before:
+            if cell != goal:
+                logs = [
+                    reward[cell[1], cell[0], move] + sharp * is_sharp(came, move) + before[target, move]
+                    for move, target in ways(free, cell)
+                ]
+                values[cell, came] = float(logsumexp(logs))
+        if max(abs(values[s] - before[s]) if isfinite(before[s]) else inf for s in values) < 1e-12:
+            return values
+    raise AssertionError("soft value iteration did not end")
+
+
+def turn_flow(
+    reward: FloatArray, sharp: float, free: BoolArray, start: Cell, goal: Cell
+) -> dict[tuple[Came, int], float]:
+    """Expected number of times that each move is made in each state, by mass that is moved step by step."""
+    values = turn_values(reward, sharp, free, goal)
+    flow: dict[tuple[Came, int], float] = {}
+    mass: dict[Came, float] = {(start, None): 1.0}
+    while sum(mass.values()) > 1e-16:
+        after: dict[Came, float] = {}
+        for (cell, came), here in mass.items():
+            for move, target in ways(free, cell):
+                log_p = (
+                    reward[cell[1], cell[0], move]
+                    + sharp * is_sharp(came, move)
+                    + values[target, move]
+                    - values[cell, came]
+                )
+                taken = here * exp(log_p)
+                flow[(cell, came), move] = flow.get(((cell, came), move), 0.0) + taken
+                if target != goal:
+                    after[target, move] = after.get((target, move), 0.0) + taken
+        mass = after
+    return flow
 
 
 # --- derivatives ----------------------------------------------------------------------------------------------------

@@ -257,7 +257,7 @@ def test_a_reward_of_other_parameters_is_refused(tmp_path, demonstration):
     result = fit(evidence_of([demonstration]), Reward.named({}))
     write_json(path, "reward", reward_document(result, [demonstration], [], 0.1), force=False)
     edited(path, lambda d: d["parameters"][0].update(name="c9"))
-    with pytest.raises(ArtefactError, match=r"expected the parameters of known terms \(c0; .*\), found c9, a_g"):
+    with pytest.raises(ArtefactError, match=r"expected c0, a_g, a_p, sigma_p, as of the terms .*, found c9, a_g"):
         read_reward(path)
     edited(path, lambda d: d["parameters"].append({**d["parameters"][0], "name": "c0"}))
     with pytest.raises(ArtefactError, match="found c9, a_g, a_p, sigma_p, c0"):

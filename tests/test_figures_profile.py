@@ -15,7 +15,7 @@ from navirl_cli.artefacts.rewards import Analyses, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.cli import cli
 from navirl_cli.errors import ArtefactError
-from navirl_cli.figures.profile import draw_profile, draw_profiles
+from navirl_cli.figures.profile import draw_profile, draw_profiles, symbol_of
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, house_style
 from navirl_cli.irl.evidence import evidence_of
@@ -324,3 +324,20 @@ def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(
     assert result.stderr.endswith("; set --wide, or fit again with fewer parameters in --profile\n")
     assert plot(common(), "--wide").exit_code == 0
     assert plot(common()[:2]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "symbol"),
+    [
+        ("c0", "$c_0$"),
+        ("a_g", "$a_g$"),
+        ("sigma_p", r"$\sigma_p$"),
+        ("sigma_before", r"$\sigma_{\mathrm{before}}$"),
+        ("a_turn", r"$a_{\mathrm{turn}}$"),
+        ("w", "$w$"),
+        ("my_own_weight", "my_own_weight"),
+        ("weight", "weight"),
+    ],
+)
+def test_parameters_have_symbols(name, symbol):
+    assert symbol_of(name) == symbol

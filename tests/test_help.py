@@ -22,6 +22,7 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
 }
 SLOW = {
+    "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",
     "study p01.mcap p02.mcap p03.mcap -o study",
@@ -114,6 +115,7 @@ TABLES = {
     "annotate": ["p01.mcap", "trials.csv", "-o", "new.mcap"],
     "extract": ["p01.mcap", "-o", "new.json"],
     "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
+    "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],
     "import-study": ["runs.tar.gz", "-o", "new"],

@@ -56,6 +56,8 @@ SCHEMA = many(
         frames=either(TEXT),
         needed=many(TEXT),
         refusals=many(TEXT),
+        demonstrations=COUNT,
+        left_out=many(TEXT),
         notes=many(TEXT),
         damage=many(TEXT),
     )

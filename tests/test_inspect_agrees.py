@@ -70,7 +70,14 @@ def not_finite():
     return log
 
 
+def sound():
+    log = without("/map")
+    log.add("/map", nav.grid(80, 80), nav.START_NS)
+    return log
+
+
 REFUSED = {
+    "a map in which the robot did not drive": lambda: nav.drive(8.0),
     "no wrench": lambda: without("/wrench"),
     "no map": lambda: without("/map"),
     "no tf": lambda: without("/tf"),
@@ -82,7 +89,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("way", [*REFUSED, "sound"])
 def test_inspect_and_extract_agree(navirl, tmp_path, way):
-    log = REFUSED.get(way, lambda: nav.drive(8.0))()
+    log = REFUSED.get(way, sound)()
     log.add("/goal_pose", nav.pose_stamped(nav.START_NS, 0.8, 0.0), nav.START_NS)
     path = log.write(tmp_path / "run.mcap")
     check_agreement(path)

@@ -60,8 +60,8 @@ STATISTICS = {
     *("value", "values", "standard_error", "standard_error_clustered", "standard_errors", "standard_errors_clustered"),
     *(
         "bias_subtracted",
-        "bias_expected",
         "parameters",
+        "bias_expected",
         "covariance",
         "covariance_clustered",
         "theta",

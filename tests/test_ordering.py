@@ -44,10 +44,10 @@ def test_paths_that_only_descend_have_no_climbs():
 def test_rank_and_order_undo_each_other_and_follow_the_distance():
     ordering = make.random_scene(np.random.default_rng(4), 13, 9, density=0.2).ordering
     assert ordering.order[0] == ordering.goal
-    assert (ordering.rank[ordering.order] == np.arange(ordering.lattice.size)).all()
+    assert (ordering.rank[ordering.order] == np.arange(ordering.graph.size)).all()
     assert (np.diff(ordering.distance[ordering.order]) >= 0).all()
     for rank, state in enumerate(ordering.order.tolist()):
-        for move, target in enumerate(ordering.lattice.neighbours[state].tolist()):
+        for move, target in enumerate(ordering.graph.neighbours[state].tolist()):
             assert ordering.neighbours[rank, move] == (-1 if target < 0 else ordering.rank[target])
 
 
@@ -55,7 +55,7 @@ def test_rank_and_order_undo_each_other_and_follow_the_distance():
 def test_a_matrix_is_split_into_steps_down_and_all_others(seed):
     rng = np.random.default_rng(seed)
     ordering = make.random_scene(rng, 12, 9, density=(0.0, 0.2, 0.35)[seed % 3]).ordering
-    size = ordering.lattice.size
+    size = ordering.graph.size
     weight = rng.random((size, 8))  # also where no move is possible: that must not matter
     whole = np.zeros((size, size))
     for rank in range(size):

@@ -11,6 +11,7 @@ from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.evaluation.segments import Segments
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.terms import TERMS
 from navirl_cli.planning.paths import Mode, Planner, measured, rewards_by_term
 from navirl_cli.planning.problem import Problem, problem_of, problem_on
 from navirl_cli.planning.recommendation import recommended, straight_passage
@@ -60,6 +61,16 @@ def test_the_likely_path_is_the_most_probable_one_of_all_that_touch_nobody(seed)
     (found,) = planner.plan(Mode.LIKELY)
     assert found.log_probability >= best - 1e-9
     assert found.log_probability == pytest.approx(log_probability(planner, found.states.tolist()))
+
+
+def test_with_a_cost_of_turns_the_most_probable_path_is_at_least_as_probable_as_any_drawn_one():
+    problem = problem_in(make.scene_on(make.open_grid(12, 9), [0, 4], [11, 4], [[0.6, 0.2]]))
+    turning = Reward((*PAPER.theta, -2.0), (*PAPER.terms, TERMS["turn"]))
+    planner = Planner(problem, turning)
+    (found,) = planner.plan(Mode.LIKELY)
+    assert found.log_probability >= max(path.log_probability for path in planner.plan(Mode.SAMPLE, 300)) - 1e-9
+    total = sum(rewards_by_term(problem, turning, found.states).values())
+    assert total - planner.policy.value_by_cell()[problem.scene.start] == pytest.approx(found.log_probability)
 
 
 def test_no_path_of_any_mode_drives_into_a_person():

@@ -47,7 +47,7 @@ def figure_of(navirl, monkeypatch):
 
     def run(*words):
         saved = []
-        monkeypatch.setattr(sheet, "save_figure", lambda figure, *_, **__: saved.append(figure))
+        monkeypatch.setattr(sheet, "save_figure", lambda figure, *_, **__: saved.append(figure) or [])
         assert navirl("plot", *words, "-o", "a.png").stdout == "a.png\n"
         return saved[0]
 

@@ -36,9 +36,10 @@ def page(work):
 
 def test_it_holds_parameters_and_their_meaning(work, page):
     document = json.loads((work / "reward.json").read_text())
-    for one in document["parameters"]:
-        low, high = (one["value"] + sign * 1.96 * one["standard_error"] for sign in (-1, 1))
-        for text in (f"{one['value']:.4f}", f"{low:.4f} to {high:.4f}"):
+    (intervals,) = document["intervals"]
+    for one, ends in zip(document["parameters"], intervals["parameters"], strict=True):
+        numbers = [one["value"], *(end for end in (ends["lower"], ends["upper"]) if end is not None)]
+        for text in (f"{number:.4f}" for number in numbers):
             assert text.replace("-", "\N{MINUS SIGN}") in page
     theta = dict(zip(("c0", "a_g", "a_p", "sigma_p"), read_reward(work / "reward.json").reward.theta, strict=True))
     assert f"<strong>{half_distance_m(theta):.3g} m</strong>" in page
@@ -56,7 +57,8 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
 
 
 def test_it_warns_of_uncertain_parameters(page):
-    assert "is uncertain: its standard error exceeds half of its value." in page
+    assert "<li>Open interval: converged, but the demonstrations set no end to a parameter on one side" in page
+    assert "Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %." in page
     assert "<li>The policy rarely takes paths like those of " not in page
 
 

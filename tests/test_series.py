@@ -17,7 +17,7 @@ def split_at_random(seed, leaving=0.2):
     ordering = make.random_scene(rng, 13, 9, density=(0.0, 0.25)[seed % 2]).ordering
     weight = np.where(ordering.neighbours >= 0, rng.random(ordering.neighbours.shape), 0.0)
     weight *= (1 - leaving) / weight.sum(axis=1, keepdims=True)
-    size = ordering.lattice.size
+    size = ordering.graph.size
     whole = np.zeros((size, size))
     rank, move = np.nonzero(ordering.neighbours >= 0)
     whole[rank, ordering.neighbours[rank, move]] = weight[rank, move]

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from truth import read_truth
+from truth import read_record, read_truth
 
+from navirl_cli.irl.reward import Reward
 from navirl_cli.simulation import person, protocol, sensors
+from navirl_cli.simulation.behaviour import Behaviour, Displeasure, Joystick
 from navirl_cli.simulation.driving import FORWARD_M_S, GAIN_S_KG, SIDEWAYS_M_S, STEP_S, Path, drive
 from navirl_cli.simulation.log import write_log
 
@@ -61,10 +63,10 @@ def test_the_person_pushes_late_with_limited_force_within_reach(written):
         force = one.steering / GAIN_S_KG
         size = np.hypot(*force.T)
         assert 5 < size.max() < 1.15 * person.MOST_FORCE_N
-        assert (size[: round(person.REACTION_S / STEP_S)] == 0).all()
+        assert (size[: round(Behaviour().delay_s / STEP_S)] == 0).all()
         touching = one.drive.xy_m[: len(size)][size > 1]
         # The hand lets go within a moment after the robot leaves its reach.
-        assert np.hypot(*(touching - session.hallway.person_m).T).max() < person.REACH_M + 0.3
+        assert np.hypot(*(touching - session.hallway.person_m).T).max() < Behaviour().reach_m + 0.3
         assert size[-1] == 0
     starts = sorted(round(float(one.drive.xy_m[0, 1]), 2) for one in pushed[:2])
     assert starts == [-0.35, 0.45]
@@ -124,3 +126,71 @@ def test_driving_back_passes_the_person_at_a_distance():
     back = protocol.drive_back(np.array([3.15, 0.05]), np.array([-3.15, 0.45]))
     assert np.hypot(*(back.xy_m - (0.1, 0.05)).T).min() > 1.0
     assert back.xy_m[-1] == pytest.approx([-3.15, 0.45], abs=0.06)
+
+
+def someone(behaviour, seed=5):
+    """A person of the published reward in a hallway."""
+    rng = np.random.default_rng(seed)
+    hallway = protocol.Hallway.with_person(rng)
+    return protocol.Someone(hallway, person.personal_reward(rng, behaviour.scatter), behaviour, rng)
+
+
+def one_pass(seed=5, **behaviour):
+    """The person's push off the straight path, and its size, N."""
+    who = someone(Behaviour(**behaviour), seed)
+    found = protocol.pushed(who, protocol.nominal_path(), 0.0, 1)
+    return who, found, np.hypot(*found.steering.T) / GAIN_S_KG
+
+
+def test_a_free_joystick_follows_the_wish_and_passes_farther_away_than_force():
+    least = {"force": [], "joystick": []}
+    for seed in range(4):
+        who, by_force, _ = one_pass(seed, scatter=0.0)
+        assert who.truth.theta == pytest.approx(person.PUBLISHED)
+        stick = protocol.steered(someone(Behaviour(joystick=Joystick.FREE, scatter=0.0), seed))
+        away = np.hypot(*(stick.drive.xy_m[::20, None] - stick.wanted.xy_m[None]).transpose(2, 0, 1)).min(axis=1)
+        assert away.max() < 0.16
+        assert np.hypot(*stick.steering.T).max() < 1.3 * person.STICK_M_S
+        for one in (by_force, stick):
+            least[one.condition].append(np.hypot(*(one.drive.xy_m - who.hallway.person_m).T).min())
+    assert np.mean(least["joystick"]) > np.mean(least["force"]) + 0.02
+
+
+def test_people_push_within_their_reach_only():
+    who, found, force = one_pass(reach_m=1.2)
+    touching = found.drive.xy_m[: len(force)][force > 1]
+    assert 0.3 < np.hypot(*(touching - who.hallway.person_m).T).max() < 1.2 + 0.3
+
+
+def test_people_of_great_tolerance_do_not_intervene_and_of_little_they_do():
+    contact = [(one_pass(tolerance_nats=nats)[2] > 3).sum() for nats in (0.0, 0.5, 1000.0)]
+    assert contact[0] >= contact[1] > contact[2] == 0
+
+
+def test_a_late_person_acts_later():
+    early, late = (np.flatnonzero(one_pass(delay_s=delay)[2])[0] for delay in (0.1, 1.0))
+    assert late - early >= 50
+
+
+def test_displeasure_is_least_on_the_most_visited_way():
+    hallway = protocol.Hallway.with_person(np.random.default_rng(0))
+    scene = protocol.scene_of(hallway, 0.0)
+    found = Displeasure.of(Reward(person.PUBLISHED), scene, protocol.nominal_path())
+    x, y = hallway.person_m
+    through, aside, behind = (found.at(np.array(at)) for at in ((x - 0.6, y), (x - 0.1, y + 0.8), (x + 2.0, y)))
+    assert through > aside > behind == 0
+    line = found.predicted_m(np.array([-2.0, 0.85]))
+    assert line[0] == pytest.approx([-2.0, 0.85], abs=0.03)
+    assert (np.diff(line[:, 1]) <= 1e-9).all()
+    # as the robot truly drives
+    true = drive(protocol.nominal_path(), np.array([-2.0, 0.85]), person.no_hand).xy_m
+    assert np.interp(true[:800:50, 0], *line.T) == pytest.approx(true[:800:50, 1], abs=0.02)
+
+
+def test_what_differs_from_the_defaults_stands_in_the_truth(written, tmp_path):
+    path, _ = written
+    assert "behaviour" not in read_record(path)
+    behaviour = Behaviour(reach_m=1.2, joystick=Joystick.FREE)
+    assert behaviour.changed() == {"reach_m": 1.2, "joystick": "free"}
+    write_log(1, 5, tmp_path / "p.mcap", behaviour, force=False)
+    assert read_record(tmp_path / "p.mcap")["behaviour"] == behaviour.changed()

@@ -56,7 +56,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("call", [scan, lambda path: read(path, {"/wrench": None})])
+@pytest.mark.parametrize("call", [scan, lambda path: read(path, {"/wrench": ()})])
 def test_files_that_are_not_mcap_are_identified(tmp_path, name, call):
     content, message = CASES[name]
     path = tmp_path / name

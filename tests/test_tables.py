@@ -213,7 +213,9 @@ def test_what_is_no_table_is_refused():
         one_column(Column("a"), [1])
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+cmd|' /C calc'!A0", "-2+3+cmd|x", "@SUM(A1)", "\t=1", "-name"])
+@pytest.mark.parametrize(
+    "text", ["=1+1", "+cmd|' /C calc'!A0", "-2+3+cmd|x", "@SUM(A1)", "\t=1", "-name", "'=1", "''-x"]
+)
 def test_texts_that_begin_like_formulas_are_quoted_in_csv_and_read_back(tmp_path, text):
     table = Table((Column("name"), Column("value_m")), ((text, -1.5), ("plain", 2.0)))
     lines = written(table, Format.CSV).splitlines()

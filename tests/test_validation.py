@@ -72,7 +72,7 @@ def test_leaving_one_out_against_a_loop(eight, validated):
 
 def test_the_model_without_people_lacks_every_term_about_them():
     evidence = evidence_of(mixed(TRUTH, 2, 2, seed=5))
-    start = Reward.named({}, (TERMS["step_length"], Egg()))
+    start = Reward.named({}, (TERMS["length"], Egg()))
     found = cross_validate(evidence, start, 1e-3, executor=Here()).log_likelihoods
     # Without the egg there is length alone, which is named once.
     assert list(found) == ["learnt", "paper", "length + personal space", "no person", "uniform"]

@@ -6,22 +6,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.irl.scene import Scene
-from navirl_cli.irl.terms.term import Jet, Parameter
+from navirl_cli.irl.terms.term import Jet, Parameter, geometric
+
+DECAYS = geometric(1e-3, 1e3, 7)
 
 
 @dataclass(frozen=True)
 class Egg:
     """A personal space that reaches further along x than across: a_e exp(-s_x dx^2 - s_y dy^2), summed over people."""
 
+    name = "egg"
+    formula = "sum_p a_e exp(-s_x x_p^2 - s_y y_p^2)"
+    symbols = ("x_p and y_p are the offsets from person p along the axes of the map.",)
     parameters = (
         Parameter(
             "a_e", "", lower=-1e4, upper=1e4, scale=1.0, initial=-4.0, meaning="reward per step at a person's place"
         ),
-        Parameter("s_x", "1/m^2", lower=1e-3, upper=1e3, scale=1.0, initial=1.0, meaning="decay along x"),
-        Parameter("s_y", "1/m^2", lower=1e-3, upper=1e3, scale=1.0, initial=3.0, meaning="decay along y"),
+        Parameter("s_x", "1/m^2", lower=1e-3, upper=1e3, scale=1.0, initial=1.0, meaning="decay along x", scan=DECAYS),
+        Parameter("s_y", "1/m^2", lower=1e-3, upper=1e3, scale=1.0, initial=3.0, meaning="decay along y", scan=DECAYS),
     )
 
     about_people = True
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         a_e, s_x, s_y = theta

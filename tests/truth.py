@@ -5,6 +5,7 @@ import json
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
@@ -28,10 +29,15 @@ class Truth:
     trials: list[TrueTrial]
 
 
-def read_truth(path: Path) -> Truth:
+def read_record(path: Path) -> dict[str, Any]:
     with path.open("rb") as stream:
         records = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
-    content = json.loads(records["navirl.truth"]["simulation"])
+    content: dict[str, Any] = json.loads(records["navirl.truth"]["simulation"])
+    return content
+
+
+def read_truth(path: Path) -> Truth:
+    content = read_record(path)
     step_ns = round(content["step_s"] * 1e9)
     trials = []
     for one in content["trials"]:

@@ -18,6 +18,7 @@ from navirl_cli.cli import COMMANDS, cli
 from navirl_cli.documents.tables import Column, Format, Table, written
 from navirl_cli.logs.roles.topics import ROLES
 from navirl_cli.reports.evaluation import metrics_table
+from navirl_cli.reports.models import terms_table
 
 HERE = Path(__file__).parent.parent
 GENERATED = HERE / "_generated"
@@ -131,6 +132,11 @@ def metrics() -> Iterator[tuple[str, str]]:
     yield "metrics.md", written(metrics_table(), Format.MARKDOWN) + "\n"
 
 
+def terms() -> Iterator[tuple[str, str]]:
+    """All terms of the package, with their parameters."""
+    yield "terms.md", unescaped(written(terms_table(), Format.MARKDOWN)) + "\n"
+
+
 def formats() -> Iterator[tuple[str, str]]:
     """The fields of every kind of file, from its schema."""
     for kind in KINDS:
@@ -205,7 +211,7 @@ def type_of(value: Mapping[str, Any], schema: Mapping[str, Any]) -> str:
 
 def write_all(_app: Sphinx) -> None:
     """Write the pages that changed, and draw the gallery."""
-    for make in (command_pages, message_types, metrics, formats):
+    for make in (command_pages, message_types, metrics, terms, formats):
         for name, text in make():
             path = GENERATED / name
             path.parent.mkdir(parents=True, exist_ok=True)

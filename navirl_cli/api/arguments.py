@@ -8,6 +8,8 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from navirl_cli.errors import ArgumentError, unknown
+from navirl_cli.irl.terms.registry import terms_named
+from navirl_cli.irl.terms.term import Term
 
 Point: TypeAlias = tuple[float, float]
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -78,3 +80,13 @@ def pairs_in(pair: tuple[str, str] | Sequence[tuple[str, str]]) -> list[tuple[st
             raise ArgumentError(f"`pair`: expected two groups, found {one[0]!r} twice")
         found.append((str(one[0]), str(one[1])))
     return found
+
+
+def terms_in(given: str | Sequence[str | Term]) -> tuple[Term, ...]:
+    """Terms of a reward: names in one text, separated by commas, or a list of names and terms; none by default.
+
+    Raises:
+        NavirlError: A term is unknown or cannot be loaded.
+    """
+    words = [word.strip() for word in given.split(",")] if isinstance(given, str) else list(given)
+    return terms_named(words) if words else ()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, texts, topics_in, within
+from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
@@ -42,16 +42,18 @@ from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import Kind
 from navirl_cli.irl.likelihood import policy_of
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.term import Term
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.overview import Overview, overview
@@ -234,6 +236,7 @@ def inspect(
 def fit(
     demos: PathLike | Sequence[Demonstration],
     *,
+    terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
     l2: float = PAPER_L2,
@@ -243,6 +246,7 @@ def fit(
     only_corrected: bool = False,
     truncated: bool = False,
     steps: str = "all",
+    reach: float | None = None,
     correct_bias: bool = False,
     intervals: str | None = None,
     bootstrap: int | None = None,
@@ -257,17 +261,22 @@ def fit(
 
     Args:
         demos: Demonstrations, or their file.
+        terms: Terms whose sum the reward is: names, separated by commas or in a list, files as "my_term.py:MyTerm", or
+            terms themselves; "length,deviation,personal-space" by default.
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
-        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, without
-            the parameters that the prior determines. 0 for none.
-        method: "newton" (trust region, and a scan of sigma_p for other maxima) or the paper's gradient ascent, "adam".
+        l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
+            of 10 /m, without the parameters that the prior determines. 0 for none.
+        method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
         condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
         cycle: Use trials of this cycle only.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
-        steps: Use "all" steps of a path, or only those during "contact".
+        steps: Use "all" steps of a path, those during "contact", or those in contact or within the person's reach
+            ("reachable"), where no push is acceptance.
+        reach: Reach of people, between the centres of robot and person, m; by default the largest distance at which
+            people pushed.
         correct_bias: Subtract the first-order bias of maximum likelihood.
         intervals: "profile", "wald" (from standard errors) or "none"; by default profile with fewer than ten
             demonstrations or where a standard error leaves the admissible range, else wald.
@@ -302,13 +311,21 @@ def fit(
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
     conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
-        demos, conditions=conditions, cycle=cycle, only_corrected=only_corrected, truncated=truncated, steps=which
+        demos,
+        conditions=conditions,
+        cycle=cycle,
+        only_corrected=only_corrected,
+        truncated=truncated,
+        steps=which,
+        reach_m=reach_m,
     )
     earlier = None if prior is None else learnt_in(prior)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")
-    start = reward_in(init) if init is not None else Reward.named({}) if earlier is None else earlier.reward
+    given = init if init is None or isinstance(init, Mapping) else reward_in(init)
+    start = starting(terms_in(terms), given, None if earlier is None else earlier.reward)
     questions.check(selected.evidence, start)
     found = fit_reward(
         selected.evidence,
@@ -317,14 +334,17 @@ def fit(
         prior=None if earlier is None else earlier.as_prior(),
         method=chosen(Method, method, "method"),
     )
+    effect = reach_effect(selected.demonstrations, found, which, reach_m)
     with _workers(executor) as workers:
         whole = which is Steps.ALL
         found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=workers)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
-    document = reward_document(found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value)
+    document = reward_document(
+        found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
+    )
     notes = (
         *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=conditions),
+        *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
         *fit_warnings(document),
     )
     reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}

@@ -154,7 +154,9 @@ def value(
     """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
     view = policy_in(reward, demonstration)
     options = _cells(view, crop, overlay, samples, seed, demos)
-    return _drawn(lambda panels: draw_value(panels[0], view.scene, view.policy.value, **options), _own(axes), page)[0]
+    return _drawn(
+        lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), _own(axes), page
+    )[0]
 
 
 def actions(
@@ -173,7 +175,11 @@ def actions(
     view = policy_in(reward, demonstration)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
-        lambda panels: draw_actions(panels[0], view.scene, view.policy.probability, **options), _own(axes), page
+        lambda panels: draw_actions(
+            panels[0], view.scene, view.policy.probability_by_cell(view.scene.start), **options
+        ),
+        _own(axes),
+        page,
     )[0]
 
 

@@ -230,12 +230,12 @@ class ScenePolicy:
     @cached_property
     def visits_by_state(self) -> FloatArray:
         """(n,) expected visits by state."""
-        return self.policy.visits_from(self.scene.start)
+        return self.policy.visits_by_cell(self.scene.start)
 
     @cached_property
     def value(self) -> FloatArray:
         """(rows, columns) soft value: log of the partition function of the paths to the goal; NaN as in visits."""
-        return self._over_map(self.policy.value)
+        return self._over_map(self.policy.value_by_cell())
 
     @cached_property
     def state_reward(self) -> FloatArray:
@@ -245,7 +245,7 @@ class ScenePolicy:
     @cached_property
     def probability(self) -> FloatArray:
         """(rows, columns, 8) probability of each move, ordered as navirl_cli.demos.grid.MOVES; NaN as in visits."""
-        return self._over_map(self.policy.probability)
+        return self._over_map(self.policy.probability_by_cell(self.scene.start))
 
     def sample(self, count: int = 20, *, seed: int = 0) -> list[FloatArray]:
         """Draw paths from start to goal.

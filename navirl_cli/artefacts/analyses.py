@@ -11,6 +11,7 @@ from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind
 from navirl_cli.irl.profile import Profile
 
 if TYPE_CHECKING:  # a reader of rewards does not draw again or leave out
+    from navirl_cli.evaluation.reach import ReachEffect
     from navirl_cli.irl.bootstrap import Bootstrap
     from navirl_cli.irl.validation import Validation
 
@@ -120,4 +121,16 @@ def validation_document(found: "Validation") -> dict[str, Any]:
             }
             for j, parameter in enumerate(found.parameters)
         },
+    }
+
+
+def reach_document(found: "ReachEffect") -> dict[str, Any]:
+    """All steps beside those within reach."""
+    return {
+        "reach_m": found.reach.reach_m,
+        "seen_in": found.reach.seen_in,
+        "steps_reachable": found.steps_reachable,
+        "steps_all": found.steps_all,
+        "min_distance_all_m": found.min_distance_all_m,
+        "min_distance_reachable_m": found.min_distance_reachable_m,
     }

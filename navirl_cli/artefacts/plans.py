@@ -82,7 +82,9 @@ def _path_document(problem: Problem, reward: Reward, one: Planned) -> dict[str, 
         "min_distance_m": number(float(lines.min_distance_m[0])) if people else None,
         "area_m2": float(lines.area_m2[0]),
         "log_probability": number(one.path.log_probability),
-        "reward_by_term": rewards_by_term(problem, reward, one.path.states),
+        "reward_by_term": {
+            name.replace("-", "_"): value for name, value in rewards_by_term(problem, reward, one.path.states).items()
+        },
         "cells": problem.scene.lattice.cells[one.path.states].tolist(),
         "xy_m": numbers(one.line_m),
         "yaw_rad": numbers(one.yaw_rad),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,19 +14,26 @@ from navirl_cli.artefacts.analyses import (
     intervals_of,
     profile_document,
     profile_of,
+    reach_document,
     validation_document,
 )
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
+from navirl_cli.evaluation.groups import by_evidence_group
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import Intervals
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
-from navirl_cli.irl.reward import Reward, terms_with
+from navirl_cli.irl.reward import Reward, parameters_of, terms_with
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms.registry import names_of, terms_named
+from navirl_cli.irl.terms.term import Term
+
+if TYPE_CHECKING:  # a reader of rewards does not fit again
+    from navirl_cli.evaluation.reach import ReachEffect
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +61,8 @@ class LearntReward(ByContent):
     status: Status
     #: Profile likelihoods.
     profiles: tuple[Profile, ...] = ()
+    #: Groups of these demonstrations; None for files from before they were written.
+    groups: tuple[str, ...] | None = None
     #: None for files from before it was written.
     search: Search | None = None
     #: Intervals of the parameters, by participant first; none in files from before they were written.
@@ -79,6 +88,7 @@ def reward_document(
     resolution_m: float,
     analyses: Analyses | None = None,
     learnt_from: str = "all",
+    reach: "ReachEffect | None" = None,
 ) -> dict[str, Any]:
     """A fit with its analyses as the content of a reward file.
 
@@ -88,11 +98,13 @@ def reward_document(
         inputs: Files that were read.
         resolution_m: Side of the cells, m.
         analyses: Bootstrap, profiles and cross-validation, where they were asked for.
-        learnt_from: "all" steps or those during "contact".
+        learnt_from: "all" steps, those during "contact", or those "reachable".
+        reach: All steps beside those within reach, where it is known.
     """
     analyses = analyses or Analyses()
     return {
         "inputs": [vars(one) for one in inputs],
+        "terms": names_of(fit.reward.terms),
         "parameters": _parameters(fit, analyses.bias),
         "covariance": numbers(fit.covariance),
         "covariance_clustered": None if fit.clustered is None else numbers(fit.clustered),
@@ -109,6 +121,8 @@ def reward_document(
         "demonstrations": [demonstration.id for demonstration in demonstrations],
         "participants": sorted({demonstration.participant for demonstration in demonstrations}),
         "learnt_from": learnt_from,
+        "groups": list(by_evidence_group(demonstrations)),
+        "reach": None if reach is None else reach_document(reach),
         "steps": fit.steps,
         "iterations": fit.iterations,
         "evaluations": fit.evaluations,
@@ -151,6 +165,25 @@ def _parameters(fit: Fit, expected: FloatArray | None) -> list[dict[str, Any]]:
     ]
 
 
+def terms_of(document: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a reward file's content.
+
+    Raises:
+        RewardError: A term is not installed, or the parameters are not those of the terms.
+    """
+    names = [parameter["name"] for parameter in document["parameters"]]
+    if "terms" not in document:
+        return terms_with(names)  # files from before terms were named
+    terms = terms_named(document["terms"])
+    own = [parameter.name for parameter in parameters_of(terms)]
+    if names != own:
+        raise RewardError(
+            f"parameters: expected {', '.join(own)}, as of the terms {', '.join(document['terms'])}, found "
+            f"{', '.join(names)}"
+        )
+    return terms
+
+
 def read_reward(path: Path) -> LearntReward:
     """A reward of a file.
 
@@ -173,7 +206,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
     values = {parameter["name"]: parameter["value"] for parameter in document["parameters"]}
     names = [parameter["name"] for parameter in document["parameters"]]
     try:
-        reward = Reward.named(values, terms_with(names))
+        reward = Reward.named(values, terms_of(document))
     except NavirlError as error:
         raise ArtefactError(f"{path}: {error}") from error
     covariance = [row(one) for one in document["covariance"]]
@@ -185,6 +218,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         covariance=np.array(covariance),
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
+        groups=tuple(document["groups"]) if "groups" in document else None,
         status=Status(document["status"]),
         profiles=profiles,
         intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),

@@ -62,11 +62,11 @@ def groups(ctx: click.Context, _incomplete: str) -> Iterable[str]:
 
 
 @_proposed
-def parameters(_ctx: click.Context, _incomplete: str) -> Iterator[str]:
-    """Parameters of the paper's reward."""
+def parameters(ctx: click.Context, _incomplete: str) -> Iterator[str]:
+    """Parameters of the terms on the command line, or of the paper's reward."""
     from navirl_cli.irl.reward import PAPER_TERMS, parameters_of
 
-    return (parameter.name for parameter in parameters_of(PAPER_TERMS))
+    return (parameter.name for parameter in parameters_of(ctx.params.get("terms") or PAPER_TERMS))
 
 
 def initial(ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem[str]]":
@@ -76,6 +76,15 @@ def initial(ctx: click.Context, param: click.Parameter, incomplete: str) -> "lis
     lacking = [one for one in parameters(ctx, param, name) if one.value not in named]
     items = [CompletionItem(f"{before}{comma}{one.value}=") for one in lacking]
     return items or [CompletionItem(incomplete, type="file")]
+
+
+@_proposed
+def terms(_ctx: click.Context, incomplete: str) -> Iterator[str]:
+    """A list of terms extended by each missing one."""
+    from navirl_cli.irl.terms import TERMS
+
+    before, comma, _ = incomplete.rpartition(",")
+    yield from (f"{before}{comma}{name}" for name in TERMS if name not in before.split(","))
 
 
 @_proposed

@@ -1,5 +1,6 @@
 """``navirl fit``: demonstrations to a reward."""
 
+from collections.abc import Sequence
 from math import isfinite, nan
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import click
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands import completion
+from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -22,19 +24,20 @@ from navirl_cli.commands.shared import (
     say,
     seed_option,
 )
-from navirl_cli.commands.types import Choice, Count, FilePath, Number
+from navirl_cli.commands.types import Choice, Count, FilePath
 from navirl_cli.commands.usage import Command, Example, as_options, section
-from navirl_cli.demos.demonstration import Condition
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
+from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.fit import PAPER_L2, Fit, Method
+from navirl_cli.irl.fit import Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
@@ -43,34 +46,18 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     examples=[
         Example("One condition and cycle", "navirl fit demos.json --condition force --cycle 2 -o reward.json"),
         Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
+        Example(
+            "Another reward",
+            "navirl fit demos.json --cycle 2 --terms length,saturating-deviation,personal-space,turn -o reward.json",
+        ),
         Example("A profile likelihood", "navirl fit demos.json --cycle 2 --profile sigma_p -o reward.json"),
     ],
 )
 @demos_argument
-@section(
-    "Demonstrations",
-    click.option(
-        "--condition",
-        "conditions",
-        multiple=True,
-        type=Choice([condition.value for condition in Condition]),
-        help="Use trials of this condition only; repeatable.",
-    ),
-    click.option("--cycle", type=int, help="Use trials of this cycle only."),
-    click.option(
-        "--truncated", is_flag=True, help="Also use trials that are cut off, which extract --keep-truncated kept."
-    ),
-    click.option("--only-corrected", is_flag=True, help="Use only trials in which the person intervened."),
-    click.option(
-        "--steps",
-        type=Choice([steps.value for steps in Steps]),
-        default=Steps.ALL.value,
-        show_default=True,
-        help="Use all steps of a path, or only those during contact.",
-    ),
-)
+@selection_options
 @section(
     "Estimation",
+    terms_option(),
     click.option(
         "--init",
         "initial",
@@ -86,14 +73,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init it also "
         "gives the initial values.",
     ),
-    click.option(
-        "--l2",
-        default=PAPER_L2,
-        show_default=True,
-        type=Number(0, 1e6),
-        help="Weight of the regulariser, nats: l2/2 times the sum of squares of c0/(10 /m), a_g, a_p and sigma_p, "
-        "without the parameters that --prior determines; 0 for none.",
-    ),
+    l2_option,
     click.option(
         "--method",
         type=Choice([method.value for method in Method]),
@@ -141,6 +121,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 def fit(
     demos: Path,
     output: Path,
+    terms: tuple[Term, ...],
     initial: str,
     prior_file: Path | None,
     l2: float,
@@ -150,6 +131,7 @@ def fit(
     only_corrected: bool,
     truncated: bool,
     steps: str,
+    reach: float | None,
     correct_bias: bool,
     intervals: str | None,
     bootstrap: int | None,
@@ -170,38 +152,44 @@ def fit(
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
-    start = _start(initial)
+    given = _given(initial)
+    if prior_file is None:
+        _start(terms, given)  # refuses wrong words before the work
+    everyone = demonstrations_in(demos)
     selected = select(
-        demonstrations_in(demos),
+        everyone,
         conditions=conditions,
         cycle=cycle,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
+        reach_m=reach,
     )
     chosen, evidence = selected.demonstrations, selected.evidence
     earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
-    if earlier is not None and not initial:
-        start = earlier.reward
+    start = _start(terms, given) if earlier is None else starting(terms, given, earlier.reward)
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
+    plain = _learn(evidence, start, earlier, l2, Method(method))
+    effect = reach_effect(chosen, plain, Steps(steps), reach)
     found, analyses, lost = answers(
         evidence,
-        _learn(evidence, start, earlier, l2, Method(method)),
+        plain,
         questions,
         whole_paths=Steps(steps) is Steps.ALL,
         bars=progress_bar,
     )
     document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps
+        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    for line in (*remarks(chosen, earlier, chosen_by=conditions), *warnings(document)):
+    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
     finish(lost)
 
@@ -219,10 +207,10 @@ def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: 
         )
 
 
-def _start(initial: str) -> Reward:
+def _given(initial: str) -> Reward | dict[str, float] | None:
     """Initial parameters from --init."""
     if not initial:
-        return Reward.named({})
+        return None
     if "=" not in initial:
         return read_reward(Path(initial)).reward
     values: dict[str, float] = {}
@@ -235,7 +223,12 @@ def _start(initial: str) -> Reward:
         if name.strip() in values or not isfinite(number):
             raise click.BadParameter(f"expected name=number once each, found {part!r}", param_hint="--init")
         values[name.strip()] = number
+    return values
+
+
+def _start(terms: Sequence[Term], given: Reward | dict[str, float] | None) -> Reward:
+    """The reward at which the fit starts without a prior; wrong names and values are wrong words of the command."""
     try:
-        return Reward.named(values)
+        return starting(terms, given)
     except RewardError as error:
         raise click.BadParameter(as_options(str(error)), param_hint="--init") from None

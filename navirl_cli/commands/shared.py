@@ -118,7 +118,12 @@ def refuse_inputs(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
 
 def _are_same(output: Path, given: Path) -> bool:
     """Whether two names are one file, also through links."""
-    return output.resolve() == given.resolve() or (output.exists() and given.exists() and output.samefile(given))
+    if output.resolve() == given.resolve():
+        return True
+    try:
+        return output.samefile(given)
+    except OSError:  # one of them does not exist, or is no possible name
+        return False
 
 
 def _files_of(path: Path) -> list[Path]:

@@ -9,6 +9,7 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands.learning import terms_option
 from navirl_cli.commands.shared import (
     bytes_bar,
     demonstrations_in,
@@ -40,6 +41,7 @@ from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
 
 if TYPE_CHECKING:
+    from navirl_cli.irl.terms.term import Term
     from navirl_cli.reports.study import StudyContext
     from navirl_cli.study.pipeline import Study
 
@@ -62,7 +64,7 @@ REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demo
     ),
     click.option("--levels", default=5, show_default=True, type=Count(2, 11), help="Answers are from 1 to this."),
 )
-@section("Learnt paths", samples_option(), seed_option)
+@section("Learnt paths", terms_option(), samples_option(), seed_option)
 @section(
     "Output",
     output_option("Folder to write; created if it does not exist."),
@@ -74,6 +76,7 @@ def study(
     output: Path,
     questionnaire: Path | None,
     levels: int,
+    terms: tuple["Term", ...],
     samples: int,
     seed: int,
     topics: tuple[tuple[str, str], ...],
@@ -92,6 +95,8 @@ def study(
     """
     from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study
+    from navirl_cli.irl.reward import PAPER_TERMS
+    from navirl_cli.irl.terms.registry import names_of
     from navirl_cli.reports.study import FIGURES, StudyContext, overview_of, remarks
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
@@ -107,10 +112,16 @@ def study(
         demonstrations = given.demonstrations
         with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
             found = study_of(
-                demonstrations, given.completion_s, samples, seed, published=given.published, progress=update
+                demonstrations,
+                given.completion_s,
+                samples,
+                seed,
+                terms=terms or PAPER_TERMS,
+                published=given.published,
+                progress=update,
             )
         inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
-        settings = {"samples": samples, "seed": seed, "levels": levels}
+        settings = {"samples": samples, "seed": seed, "levels": levels, "terms": names_of(found.terms)}
         numbers = study_document(found, given.cells, bars)
         document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
         write_json(folder / SUMMARY, "study", document, force=force)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from navirl_cli.errors import unknown
+from navirl_cli.errors import ArgumentError, unknown
 
 #: Whoever reads a file says why it cannot be read, and goes on with others.
 FilePath = click.Path(path_type=Path, readable=False)
@@ -38,6 +38,23 @@ class RoleTopic(click.ParamType):  # type: ignore[type-arg]
         if role not in roles:
             self.fail(unknown("role", role, roles), param, ctx)
         return role, topic
+
+
+class Terms(click.ParamType):  # type: ignore[type-arg]
+    """Comma-separated terms of a reward."""
+
+    name = "term,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[Any, ...]:
+        """Look the names up."""
+        from navirl_cli.irl.terms.registry import terms_named
+
+        if not isinstance(value, str):
+            return tuple(value)
+        try:
+            return terms_named([word.strip() for word in value.split(",")])
+        except ArgumentError as error:
+            self.fail(str(error).removeprefix("`terms`: "), param, ctx)
 
 
 class Number(click.FloatRange):

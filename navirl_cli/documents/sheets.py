@@ -94,7 +94,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str
 
 def _unquoted(cell: str) -> str:
     """A cell without the quote that keeps a spreadsheet from running it as a formula."""
-    return cell[1:] if cell[:1] == "'" and cell[1:2] in FORMULA else cell
+    return cell[1:] if cell[:1] == "'" and cell.lstrip("'")[:1] in FORMULA else cell
 
 
 def _check_header(where: str, header: list[str], columns: Sequence[str], needed: Sequence[str], rows: str) -> None:

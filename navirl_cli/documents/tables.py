@@ -303,7 +303,7 @@ def _csv(table: Table) -> str:
 
 def _no_formula(text: str) -> str:
     """A text that a spreadsheet does not run: a quote stands before what begins like a formula."""
-    return f"'{text}" if text[:1] in FORMULA and not _COORDINATES.fullmatch(text) else text
+    return f"'{text}" if text.lstrip("'")[:1] in FORMULA and not _COORDINATES.fullmatch(text) else text
 
 
 def _plain_text(table: Table) -> str:

@@ -85,7 +85,7 @@ def draw(
         drawn = [values[metric.name] for metric in there if metric.exact is None]
         more = _needed(drawn, precision.error) - len(paths)
         if more > 0:
-            paths = paths.joined(sample_paths(policy, scene.start, more, rng), policy.goal)
+            paths = paths.joined(sample_paths(policy, scene.start, more, rng), scene.goal)
             values = _values(there, steps, paths, shown)
     visits = Visits(steps, policy, scene.start)
     exact = {metric.name: metric.exact(visits) for metric in there if metric.exact is not None}

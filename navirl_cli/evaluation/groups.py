@@ -118,6 +118,20 @@ def group_of(demonstration: Demonstration, fields: Collection[str] = ()) -> str:
     return ", ".join([*condition, *cycle, *([] if demonstration.set is None else [demonstration.set])])
 
 
+def evidence_group_of(demonstration: Demonstration) -> str:
+    """The group of a demonstration as evidence: :func:`group_of`, and whether there are people in the scene."""
+    return group_of(demonstration) + ("" if len(demonstration.people_m) else ", no people")
+
+
+def by_evidence_group(demonstrations: Iterable[Demonstration]) -> dict[str, list[Demonstration]]:
+    """Demonstrations by :func:`evidence_group_of`, in the order of :func:`by_group`."""
+    groups: dict[str, list[Demonstration]] = {}
+    for own in by_group(demonstrations).values():
+        for one in own:
+            groups.setdefault(evidence_group_of(one), []).append(one)
+    return groups
+
+
 def summary_of(group: str, path_type: str, rows: Iterable[Measured]) -> GroupMetrics:
     """Mean, standard deviation and interval over a group's paths of one type, those with a value each.
 

@@ -110,7 +110,7 @@ class Visits:
     steps: Steps
     #: On the same lattice.
     policy: Policy
-    #: State in which paths start.
+    #: Cell of the lattice in which paths start.
     start: int
 
     @property
@@ -128,16 +128,16 @@ class Visits:
     def heading_rad(self) -> float:
         """Expected sum of the absolute changes of direction, rad."""
         # The next move is drawn in the state where this one ends; the goal has no next move.
-        turns = self.policy.probability @ TURN_RAD
-        after = np.where(self._flow > 0, self.steps.lattice.neighbours, 0)
-        turned = np.take_along_axis(turns[after], np.arange(8)[None, :, None], 2)[..., 0]
-        return float((self._flow * turned).sum())
+        policy = self.policy
+        turns = policy.probability @ TURN_RAD.T
+        flow = policy.visits_from(self.start)[:, None] * policy.probability
+        after = np.where(flow > 0, policy.graph.neighbours, 0)
+        return float((flow * turns[after, np.arange(8)]).sum())
 
     @cached_property
     def _flow(self) -> FloatArray:
         """(n, 8) expected number of times that each step is taken."""
-        flow: FloatArray = self.policy.visits_from(self.start)[:, None] * self.policy.probability
-        return flow
+        return self.policy.flow_by_cell(self.start)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,8 +59,7 @@ def ranks_of(
     for number, (one, scene) in enumerate(zip(demonstrations, scenes_of(demonstrations), strict=True)):
         if scene not in drawn:
             policy = policy_of(reward, scene)
-            paths = sample_paths(policy, scene.start, samples, rng)
-            drawn[scene] = policy, sampled_log_likelihoods(policy, paths)
+            drawn[scene] = policy, sampled_log_likelihoods(policy, sample_paths(policy, scene.start, samples, rng))
         policy, among = drawn[scene]
         own = path_log_likelihood(policy, scene.lattice.states_of(one.cells), moves_along(one.cells))
         # Sums in another order differ in their last digits.
@@ -74,20 +73,13 @@ def ranks_of(
 
 def path_log_likelihood(policy: Policy, states: IntArray, moves: IntArray) -> float:
     """Log-probability of a (k,) path's k - 1 moves, nats; -inf where the policy never makes one."""
-    with np.errstate(divide="ignore"):
-        return float(np.log(policy.probability[states[:-1], moves]).sum())
+    return float(policy.log_likelihoods(states, moves).sum())
 
 
 def sampled_log_likelihoods(policy: Policy, paths: SampledPaths) -> FloatArray:
     """(paths,) log-probabilities of paths drawn from the policy, nats."""
-    here, after = paths.states[:, :-1], paths.states[:, 1:]
-    with np.errstate(divide="ignore"):
-        logs = np.log(policy.probability)
-    total = np.zeros(len(paths))
-    for step in range(here.shape[1]):
-        driving = np.flatnonzero(here[:, step] != policy.goal)
-        moves = (policy.lattice.neighbours[here[driving, step]] == after[driving, step, None]).argmax(axis=1)
-        total[driving] += logs[here[driving, step], moves]
+    moves = moves_along(policy.lattice.cells[paths.states])
+    total: FloatArray = policy.log_likelihoods(paths.states, moves).sum(axis=1)
     return total
 
 

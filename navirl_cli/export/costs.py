@@ -30,6 +30,8 @@ from navirl_cli.planning.recommendation import straight_passage
 MOST_COST: Final = 252
 #: What a mask's occupancy of 99 becomes: 100 is an obstacle.
 MOST_MASK_COST: Final = 251
+#: Terms about people, one of which a reward needs, and the others that it may have.
+SPACES, LINE = frozenset({"personal-space", "length-space"}), frozenset({"length", "deviation"})
 #: Factors of the people's part that are tried, from the reward's own on.
 _FACTORS: Final = np.geomspace(1.0, 8.0, 43)
 #: Largest cost_travel_multiplier that is written.
@@ -92,6 +94,12 @@ class CostModel:
 
     def __post_init__(self) -> None:
         """Refuse a reward that no planner can drive."""
+        names = [term.name for term in self.reward.terms]
+        if not (SPACES & set(names) and set(names) <= SPACES | LINE):
+            raise RewardError(
+                f"expected a reward of length, {' or '.join(sorted(SPACES))} and at most deviation, which are what a "
+                f"planner's costs can hold, found {', '.join(names)}; fit one with such `terms`"
+            )
         if self._theta.get("c0", 0.0) >= 0:
             raise RewardError(
                 "expected a reward with a cost of path length (c0 below 0), to which a planner's costs are relative, "
@@ -103,6 +111,14 @@ class CostModel:
         return {p.name: value for p, value in zip(self.reward.parameters, self.reward.theta, strict=True)}
 
     @property
+    def _space(self) -> tuple[float, float]:
+        """Reward of a straight step at a person's place, nats, and its decay, 1/m^2."""
+        theta = self._theta
+        if "a_p" in theta:
+            return theta["a_p"], theta["sigma_p"]
+        return theta["a_l"] * self.resolution_m, theta["sigma_l"]
+
+    @property
     def cell_reward(self) -> float:
         """Reward of a cell's side of length, nats."""
         return self._theta["c0"] * self.resolution_m
@@ -110,12 +126,12 @@ class CostModel:
     @property
     def amplitude(self) -> float:
         """Cost at a person's place, before any cap."""
-        return self.people_factor * self.planner.amplitude * self._theta["a_p"] / self.cell_reward
+        return self.people_factor * self.planner.amplitude * self._space[0] / self.cell_reward
 
     @property
     def covariance_m2(self) -> float:
         """Of the Gaussian around a person: sigma_p d^2 = d^2 / (2 covariance)."""
-        return 1 / (2 * self._theta["sigma_p"])
+        return 1 / (2 * self._space[1])
 
     def near_people(self, away_m: FloatArray) -> FloatArray:
         """Costs of people at distances, before any cap.
@@ -126,7 +142,7 @@ class CostModel:
         Returns:
             (...) costs; those of several people add up.
         """
-        bumps: FloatArray = np.exp(-self._theta["sigma_p"] * away_m**2)
+        bumps: FloatArray = np.exp(-self._space[1] * away_m**2)
         costs: FloatArray = self.amplitude * bumps.sum(axis=-1)
         return costs
 

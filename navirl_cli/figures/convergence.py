@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.figures.profile import SYMBOLS
+from navirl_cli.figures.profile import symbol_of
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style
 from navirl_cli.irl.terms.term import Parameter
 
@@ -49,7 +49,7 @@ def draw_convergence(
     """
     lines = [_panel(axes[0], log_likelihood, "log-likelihood", "nats")]
     for panel, values, parameter in zip(axes[1:], theta.T, parameters, strict=True):
-        symbol = SYMBOLS.get(parameter.name, parameter.name)
+        symbol = symbol_of(parameter.name)
         lines.append(_panel(panel, values, symbol, parameter.unit.replace("^2", "²")))
     spec = axes[0].get_subplotspec()
     columns = 1 if spec is None else spec.get_gridspec().ncols

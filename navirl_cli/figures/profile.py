@@ -1,5 +1,6 @@
 """Profile likelihoods: the largest log-likelihood with one parameter fixed, on both sides of its estimate."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,8 +13,6 @@ from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look, panel_width_in
 from navirl_cli.irl.profile import Profile, fall_at
 
-#: The parameters in the paper's notation.
-SYMBOLS = {"c0": "$c_0$", "a_g": "$a_g$", "a_p": "$a_p$", "sigma_p": r"$\sigma_p$"}
 #: The curve is drawn down to this multiple of the fall at the interval's ends.
 DEPTH = 1.6
 #: Ratio of height to width of a panel; height of a second line of title and label, and largest height, inches.
@@ -21,6 +20,16 @@ ASPECT, MORE_IN, TALLEST_IN = 0.72, 0.6, 2.6
 #: A panel narrower than the first is not legible; one narrower than the second has fewer ticks and a smaller title,
 #: inches.
 NARROWEST_IN, NARROW_IN = 1.6, 2.2
+
+
+def symbol_of(name: str) -> str:
+    """A parameter's name as mathematical text, as in the paper; names of other forms are unchanged."""
+    parts = re.fullmatch(r"(sigma|[A-Za-z])(?:_?([0-9]+)|_([A-Za-z0-9]+))?", name)
+    if parts is None:
+        return name
+    head, index = parts[1].replace("sigma", r"\sigma"), parts[2] or parts[3] or ""
+    below = index if len(index) < 2 else rf"{{\mathrm{{{index}}}}}"
+    return f"${head}_{below}$" if index else f"${head}$"
 
 
 def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_in: float) -> Figure:
@@ -101,7 +110,7 @@ def _write(axes: Axes, profile: Profile, best: float, unit: str) -> None:
     side, reach = ("left", 3) if best - left < (right - left) / 4 else ("right", -3)
     label, at = f"{100 * profile.level:.4g} %", (best, -fall_at(profile.level))
     axes.annotate(label, at, (reach, 1.5), textcoords="offset points", ha=side, va="bottom", fontsize=7)
-    symbol = SYMBOLS.get(profile.name, profile.name)
+    symbol = symbol_of(profile.name)
     axes.set_xlabel(symbol + (f" [{unit.replace('^2', '²')}]" if unit else ""), parse_math=True)
     axes.set_ylabel("relative log-likelihood [nats]" if alone else "relative\nlog-likelihood [nats]")
     ends = ["open" if end is None else f"{end:.3g}" for end in (profile.lower, profile.upper)]

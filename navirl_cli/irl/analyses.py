@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import ArgumentError, NavirlError
 from navirl_cli.irl.bias import corrected, expected_bias
 from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
@@ -77,8 +77,8 @@ class Questions:
                 evidence.several_people(name)
 
 
-@dataclass(frozen=True)
-class Analyses:
+@dataclass(frozen=True, eq=False)
+class Analyses(ByContent):
     """The results of the analyses."""
 
     #: Intervals of the parameters, by participant first where there are several.

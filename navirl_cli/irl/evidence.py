@@ -10,6 +10,7 @@ from navirl_cli.arrays import IntArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import moves_along
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.irl.graph import NO_MOVE, Graph
 from navirl_cli.irl.scene import Scene, scenes_of
 
 
@@ -18,22 +19,28 @@ class SceneEvidence:
     """All steps that were demonstrated in one scene."""
 
     scene: Scene
-    #: (m,) state that each step leaves, and number of its move.
+    #: (m,) state of the lattice that each step leaves, number of its move, and of the move before it: NO_MOVE where the
+    #: path begins.
     state: IntArray
     move: IntArray
+    incoming: IntArray
     #: (m,) number of the demonstration (in the whole list) that each step belongs to, and of the step on its path.
     owner: IntArray
     number: IntArray
 
     @property
     def target(self) -> IntArray:
-        """(m,) state that each step leads to."""
+        """(m,) state of the lattice that each step leads to."""
         target: IntArray = self.scene.lattice.neighbours[self.state, self.move]
         return target
 
+    def states_in(self, graph: Graph) -> IntArray:
+        """(m,) the state of a graph on the lattice that each step leaves."""
+        return graph.states_in(self.state, self.incoming)
+
     def taken(self, steps: IntArray | NDArray[np.bool_]) -> "SceneEvidence":
         """Some of the steps, by number or mask; a step named twice counts twice."""
-        arrays = {name: getattr(self, name)[steps] for name in ("state", "move", "owner", "number")}
+        arrays = {name: getattr(self, name)[steps] for name in ("state", "move", "incoming", "owner", "number")}
         return replace(self, **arrays)
 
 
@@ -101,6 +108,15 @@ class Evidence:
         """
         return self._of(part.taken(np.repeat(np.arange(len(part.owner)), counts[part.owner])) for part in self.scenes)
 
+    def apart(self, participant: str) -> tuple["Evidence", "Evidence"]:
+        """The steps of all other participants, and those of one.
+
+        Raises:
+            DemonstrationError: One of the two has no step.
+        """
+        others = np.array([name != participant for name in self.participants], dtype=int)
+        return self.repeated(others), self.repeated(1 - others)
+
     def _of(self, parts: Iterable[SceneEvidence]) -> "Evidence":
         left = tuple(part for part in parts if len(part.state))
         if not left:
@@ -137,5 +153,6 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
         owners = np.concatenate([np.full(len(states), owner) for states, _, owner in own])
         numbers = np.concatenate([np.arange(len(states)) for states, _, _ in own])
         state, move = (np.concatenate([step[i] for step in own]) for i in (0, 1))
-        parts.append(SceneEvidence(scene, state, move, owners, numbers))
+        incoming = np.where(numbers == 0, NO_MOVE, np.roll(move, 1))
+        parts.append(SceneEvidence(scene, state, move, incoming, owners, numbers))
     return Evidence(tuple(parts), tuple(d.participant for d in demonstrations))

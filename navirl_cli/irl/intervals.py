@@ -9,6 +9,7 @@ that of the model (Rotnitzky and Jewell 1990, Biometrika 77:485).
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from math import inf, isfinite, isnan, sqrt
 from statistics import NormalDist
 
@@ -16,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.fit import PAPER_L2, Fit, fit
-from navirl_cli.irl.newton import Maximum, Point, maximise, moved
+from navirl_cli.irl.fit import PAPER_L2, Fit
+from navirl_cli.irl.newton import Effort, Maximum, Point, maximise, moved
 from navirl_cli.irl.objective import Objective
 from navirl_cli.irl.scan import Scan
 from navirl_cli.irl.terms.term import Parameter
@@ -29,6 +30,10 @@ LEVEL = 0.95
 END_TOLERANCE, END_TRIES = 0.01, 40
 #: Largest number of steps of the climb at a value. Along a curved ridge a climb takes many for little.
 MOST_STEPS = 40
+#: Predicted gain at which a climb at a value ends, as a share of the fall: it shifts an end by half of this.
+ENOUGH = 2e-3
+#: With fewer participants the scatter between them says too little for an interval: Student's quantile is 4.3 and more.
+FEWEST_PARTICIPANTS = 4
 #: How often an end is moved on because another branch of the other parameters reaches farther.
 BRANCHES = 5
 
@@ -153,8 +158,9 @@ def quantile(found: Fit, errors: Errors) -> float:
 
 
 def _errors(found: Fit) -> list[Errors]:
-    """By participant first, where there are several."""
-    return [Errors.MODEL] if found.clustered is None else [Errors.PARTICIPANT, Errors.MODEL]
+    """By participant first, where there are enough of them."""
+    few = found.clustered is None or found.participants < FEWEST_PARTICIPANTS
+    return [Errors.MODEL] if few else [Errors.PARTICIPANT, Errors.MODEL]
 
 
 def _numbers(found: Fit) -> list[int]:
@@ -199,21 +205,30 @@ class _Profiler:
     free: NDArray[np.bool_]
     #: All places found so far: each shows how far an interval reaches at least.
     seen: list[Point]
+    #: Whether the profile over what enters non-linearly has several peaks, between which the others may jump.
+    branched: bool
+    #: Predicted gain at which a climb ends, nats.
+    enough: float
 
     @staticmethod
     def of(evidence: Evidence, found: Fit, fall: float) -> "_Profiler":
         """The likelihood around its maximum, and its profiles over what enters non-linearly."""
         l2 = 0.0 if found.l2 <= PAPER_L2 else found.l2
         free = found.identified
-        held = [p.name for p, one in zip(found.reward.parameters, free, strict=True) if not one]
-        best = found if l2 == found.l2 else fit(evidence, found.reward, l2, prior=found.prior, fixed=held)
-        objective = Objective.of(evidence, best.reward, l2, found.prior)
-        top = objective(objective.to_units(best.reward.theta))
+        objective = Objective.of(evidence, found.reward, l2, found.prior)
+        top = estimate = objective(objective.to_units(found.reward.theta))
+        if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere; the scan below finds others
+            top = maximise(objective, estimate, objective.bounds, free, effort=Effort(MOST_STEPS)).best
         scans = [(j, values) for j, values in objective.scans() if free[j]]
-        seen = [top, objective(objective.to_units(found.reward.theta))]
+        seen = [top, estimate]
+        branched = len(scans) > 1
         for j, values in scans:
-            seen += Scan(objective, objective.bounds, free, None, [_known(top)], fall).follow(j, values)
-        return _Profiler(objective, max(seen, key=lambda point: point.value), free, seen)
+            along = Scan(objective, objective.bounds, free, None, [_known(top)], fall).follow(j, values)
+            seen += along
+            branched |= _has_several_peaks(along, j)
+        best_seen = max(seen, key=lambda point: point.value)
+        smallest = NormalDist().inv_cdf(0.5 + LEVEL / 2) ** 2 / 2
+        return _Profiler(objective, best_seen, free, seen, branched, ENOUGH * smallest)
 
     def ends(self, j: int, side: int, falls: list[float]) -> list[float | None]:
         """The ends on one side of the intervals of parameter j at several falls, in its unit; None where open."""
@@ -263,7 +278,8 @@ class _Profiler:
             begin = self.objective(np.where(np.arange(len(guess.x)) == j, value, guess.x))
         if not isfinite(begin.value):
             return begin
-        self.seen.append(maximise(self.objective, begin, self.objective.bounds, others, most=MOST_STEPS).best)
+        climb = maximise(self.objective, begin, self.objective.bounds, others, effort=Effort(MOST_STEPS, self.enough))
+        self.seen.append(climb.best)
         return self.seen[-1]
 
     def _crossing(self, j: int, fall: float, inside: Point, outside: Point) -> Point:
@@ -285,7 +301,7 @@ class _Profiler:
         """A place at the end's value that lies well inside, with other values of what enters non-linearly."""
         others = self.free & (np.arange(len(end.x)) != j)
         scans = [(i, values) for i, values in self.objective.scans() if others[i]]
-        if not scans:
+        if not scans or not self.branched:
             return None
         search = Scan(self.objective, self.objective.bounds, others, None, [_known(end)])
         best = max((place for i, values in scans for place in search.follow(i, values)), key=lambda one: one.value)
@@ -293,6 +309,13 @@ class _Profiler:
 
     def _within(self, place: Point, fall: float) -> bool:
         return place.value >= self.top.value - fall
+
+
+def _has_several_peaks(along: list[Point], j: int) -> bool:
+    """Whether the values along a profile fall and rise again."""
+    values = [point.value for point in sorted(along, key=lambda point: float(point.x[j]))]
+    steps = [later - earlier for earlier, later in pairwise(values) if abs(later - earlier) > END_TOLERANCE]
+    return any(before < 0 < after for before, after in pairwise(steps))
 
 
 def _known(point: Point) -> Maximum:

@@ -1,19 +1,18 @@
-"""The free cells of a grid as a graph: neighbours and shortest paths."""
+"""The free cells of a grid as a graph."""
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES, OPPOSITE, Grid
+from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES, Grid
 from navirl_cli.errors import SceneError
+from navirl_cli.irl.graph import Graph
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class Lattice(Graph):
     """The connected free cells of a grid, numbered, with their eight moves."""
 
     grid: Grid
@@ -47,9 +46,29 @@ class Lattice:
         return Lattice(grid, cells, index, neighbours)
 
     @property
-    def size(self) -> int:
-        """Number of states n."""
-        return len(self.cells)
+    def lattice(self) -> "Lattice":
+        """Itself: its states are the cells."""
+        return self
+
+    def states_in(self, cells: IntArray, incoming: IntArray) -> IntArray:  # noqa: ARG002
+        """The cells, whatever the incoming moves."""
+        return cells
+
+    def cells_of(self, states: IntArray) -> IntArray:
+        """The states: every cell is one state."""
+        return states
+
+    def on_states(self, values: FloatArray) -> FloatArray:
+        """The values: every cell is one state."""
+        return values
+
+    def by_cell(self, values: FloatArray) -> FloatArray:
+        """The values: every cell is one state."""
+        return values
+
+    def where_paths_begin(self, values: FloatArray) -> FloatArray:
+        """The values: every cell is one state."""
+        return values
 
     @cached_property
     def step_m(self) -> FloatArray:
@@ -60,11 +79,6 @@ class Lattice:
     def xy_m(self) -> FloatArray:
         """(n, 2) centre of every state, m, map frame."""
         return self.grid.centres_of(self.cells)
-
-    @cached_property
-    def possible(self) -> NDArray[np.bool_]:
-        """(n, 8) whether a move is possible."""
-        return self.neighbours >= 0
 
     @cached_property
     def edges(self) -> tuple[IntArray, IntArray, IntArray]:
@@ -78,46 +92,6 @@ class Lattice:
         states = np.full(len(cells), -1, dtype=np.int64)
         states[inside] = self.index[cells[inside, 1], cells[inside, 0]]
         return states
-
-    @cached_property
-    def _reversed(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The graph of reversed steps as a compressed sparse matrix: places in (n, 8) of its entries, targets, starts.
-
-        A path to the goal is a path from the goal along reversed steps. Every step s -> s' has its reverse s' -> s. The
-        reversed graph therefore has the same pattern, with the costs of the opposite moves.
-        """
-        _, move, target = self.edges
-        starts = np.concatenate([[0], np.cumsum(self.possible.sum(axis=1))])
-        return target * 8 + OPPOSITE[move], target.astype(np.int32), starts.astype(np.int32)
-
-    def costs_to(self, goal: int, cost: FloatArray) -> FloatArray:
-        """Cost of the cheapest path from every state to the goal (Dijkstra).
-
-        Args:
-            goal: A state.
-            cost: Broadcastable to (n, 8), positive, of each possible move.
-
-        Returns:
-            (n,) costs.
-        """
-        from scipy.sparse.csgraph import dijkstra
-
-        found: FloatArray = dijkstra(self._reversed_graph(cost), indices=goal)
-        return found
-
-    def cheapest_tree(self, goal: int, cost: FloatArray) -> tuple[FloatArray, IntArray]:
-        """As :meth:`costs_to`, with the (n,) next state on each cheapest path, -1 for the goal."""
-        from scipy.sparse.csgraph import dijkstra
-
-        found, following = dijkstra(self._reversed_graph(cost), indices=goal, return_predecessors=True)
-        return found, np.maximum(following, -1)
-
-    def _reversed_graph(self, cost: FloatArray) -> Any:
-        from scipy.sparse import csr_array
-
-        places, targets, starts = self._reversed
-        full = np.broadcast_to(cost, self.neighbours.shape).reshape(-1)
-        return csr_array((full[places], targets, starts), shape=(self.size, self.size))
 
     def descend(self, start: int, goal: int, cost: FloatArray) -> IntArray:
         """States along one cheapest path, start and goal included.

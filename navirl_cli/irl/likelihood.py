@@ -16,10 +16,14 @@ import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence, SceneEvidence
+from navirl_cli.irl.graph import Graph
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms.term import Jet
 from navirl_cli.irl.values import Policy, solve
+
+#: States whose products are summed at once, so that large maps take little memory.
+BLOCK = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +60,15 @@ def policy_of(reward: Reward, scene: Scene) -> Policy:
     Raises:
         InfinitePartitionError: The partition function is infinite.
     """
-    return solve(scene.ordering, reward.on(scene).value)
+    return solve(reward.ordering(scene), reward.on(scene).value)
 
 
 def log_likelihood(evidence: Evidence, reward: Reward) -> float:
     """Log-likelihood alone, without derivatives."""
     total = 0.0
     for part in evidence.scenes:
-        jet, policy = _solved(part, reward)
-        total += float(_step_values(part, jet, policy).sum())
+        jet, policy, steps = _solved(part, reward)
+        total += float(steps.values(jet, policy).sum())
     return total
 
 
@@ -76,9 +80,9 @@ def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, Float
     """
     value, gradient = 0.0, np.zeros(len(reward.theta))
     for part in evidence.scenes:
-        jet, policy = _solved(part, reward)
-        value += float(_step_values(part, jet, policy).sum())
-        gradient += _at_steps(jet.first, part).sum(axis=0) - _flow(part, policy) @ _means(jet.first, policy)
+        jet, policy, steps = _solved(part, reward)
+        value += float(steps.values(jet, policy).sum())
+        gradient += steps.features(jet.first).sum(axis=0) - steps.flow(policy) @ _means(jet.first, policy)
     return value, gradient
 
 
@@ -95,12 +99,12 @@ def likelihood(evidence: Evidence, reward: Reward) -> Likelihood:
     k = len(reward.theta)
     value, hessian, scores, information = 0.0, np.zeros((k, k)), np.zeros((evidence.count, k)), np.zeros((k, k))
     for part in evidence.scenes:
-        jet, policy = _solved(part, reward)
-        value += float(_step_values(part, jet, policy).sum())
+        jet, policy, steps = _solved(part, reward)
+        value += float(steps.values(jet, policy).sum())
         slope = policy.expected_to_goal(_means(jet.first, policy))
-        for j, one in enumerate(_step_gradients(part, jet, slope).T):
+        for j, one in enumerate(steps.gradients(jet, slope).T):
             scores[:, j] += np.bincount(part.owner, one, minlength=evidence.count)
-        expected, bend = _curvature(part, jet, policy, slope)
+        expected, bend = _curvature(steps, jet, policy, slope)
         information += expected
         hessian += bend - expected
     return Likelihood(value, scores.sum(axis=0), hessian, scores, information)
@@ -114,9 +118,9 @@ def step_likelihood(evidence: Evidence, reward: Reward) -> StepLikelihood:
     """
     values, gradients = [], []
     for part in evidence.scenes:
-        jet, policy = _solved(part, reward)
-        values.append(_step_values(part, jet, policy))
-        gradients.append(_step_gradients(part, jet, policy.expected_to_goal(_means(jet.first, policy))))
+        jet, policy, steps = _solved(part, reward)
+        values.append(steps.values(jet, policy))
+        gradients.append(steps.gradients(jet, policy.expected_to_goal(_means(jet.first, policy))))
     owners, numbers = (
         np.concatenate([getattr(part, name) for part in evidence.scenes]) for name in ("owner", "number")
     )
@@ -125,7 +129,10 @@ def step_likelihood(evidence: Evidence, reward: Reward) -> StepLikelihood:
 
 def feature_sums(evidence: Evidence, reward: Reward) -> FloatArray:
     """(k,) sums of the features dr/dtheta over the demonstrated steps."""
-    sums = [_at_steps(reward.on(part.scene).first, part).sum(axis=0) for part in evidence.scenes]
+    sums = [
+        _Steps.of(part, reward.ordering(part.scene).graph).features(reward.on(part.scene).first).sum(axis=0)
+        for part in evidence.scenes
+    ]
     return np.asarray(np.sum(sums, axis=0))
 
 
@@ -144,29 +151,56 @@ def path_covariance(evidence: Evidence, reward: Reward) -> tuple[FloatArray, lis
     k = len(reward.theta)
     total = np.zeros((k + len(pairs), k + len(pairs)))
     for part in evidence.scenes:
-        jet, policy = _solved(part, reward)
+        jet, policy, steps = _solved(part, reward)
         features = [*jet.first, *(jet.second.get(pair, np.zeros((1, 1))) for pair in pairs)]
         slope = policy.expected_to_goal(_means(features, policy))
-        total += _covariance(features, policy, slope, policy.probability * _flow(part, policy)[:, None])
+        total += _covariance(features, policy, slope, policy.probability * steps.flow(policy)[:, None])
     return total, pairs
 
 
-def _solved(part: SceneEvidence, reward: Reward) -> tuple[Jet, Policy]:
-    """Reward and policy in the evidence's scene."""
-    jet = reward.on(part.scene)
-    return jet, solve(part.scene.ordering, jet.value)
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Demonstrated steps on the states of a graph."""
+
+    graph: Graph
+    #: (m,) state that each step leaves, number of its move, and state that it leads to.
+    state: IntArray
+    move: IntArray
+    target: IntArray
+
+    @staticmethod
+    def of(part: SceneEvidence, graph: Graph) -> "_Steps":
+        """The steps of evidence."""
+        state = part.states_in(graph)
+        return _Steps(graph, state, part.move, graph.neighbours[state, part.move])
+
+    def values(self, jet: Jet, policy: Policy) -> FloatArray:
+        """(m,) log p(a|s) of every step."""
+        logs: FloatArray = jet.value[self.state, self.move] + policy.value[self.target] - policy.value[self.state]
+        return logs
+
+    def features(self, features: Sequence[FloatArray]) -> FloatArray:
+        """(m, k) features, each broadcastable to (n, 8), at the steps."""
+        shape = self.graph.neighbours.shape
+        return np.stack([np.broadcast_to(feature, shape)[self.state, self.move] for feature in features], axis=1)
+
+    def gradients(self, jet: Jet, slope: FloatArray) -> FloatArray:
+        """(m, k) gradient of every step's log-likelihood."""
+        gradients: FloatArray = self.features(jet.first) + slope[self.target] - slope[self.state]
+        return gradients
+
+    def flow(self, policy: Policy) -> FloatArray:
+        """(n,) visits D_w from the net flow w: a state is left w times more often than it is entered."""
+        size = self.graph.size
+        net = np.bincount(self.state, minlength=size) - np.bincount(self.target, minlength=size)
+        net[policy.goal] = 0  # the goal's value is zero whatever the parameters
+        return policy.visits(net.astype(float))
 
 
-def _step_values(part: SceneEvidence, jet: Jet, policy: Policy) -> FloatArray:
-    """(m,) log p(a|s) of every step."""
-    logs: FloatArray = jet.value[part.state, part.move] + policy.value[part.target] - policy.value[part.state]
-    return logs
-
-
-def _at_steps(features: Sequence[FloatArray], part: SceneEvidence) -> FloatArray:
-    """(m, k) features, each broadcastable to (n, 8), at the demonstrated steps."""
-    shape = part.scene.lattice.neighbours.shape
-    return np.stack([np.broadcast_to(feature, shape)[part.state, part.move] for feature in features], axis=1)
+def _solved(part: SceneEvidence, reward: Reward) -> tuple[Jet, Policy, _Steps]:
+    """Reward and policy in the evidence's scene, and the steps on its states."""
+    jet, ordering = reward.on(part.scene), reward.ordering(part.scene)
+    return jet, solve(ordering, jet.value), _Steps.of(part, ordering.graph)
 
 
 def _means(features: Sequence[FloatArray], policy: Policy) -> FloatArray:
@@ -181,27 +215,13 @@ def _means(features: Sequence[FloatArray], policy: Policy) -> FloatArray:
     )
 
 
-def _step_gradients(part: SceneEvidence, jet: Jet, slope: FloatArray) -> FloatArray:
-    """(m, k) gradient of every step's log-likelihood."""
-    gradients: FloatArray = _at_steps(jet.first, part) + slope[part.target] - slope[part.state]
-    return gradients
-
-
-def _flow(part: SceneEvidence, policy: Policy) -> FloatArray:
-    """(n,) visits D_w from the net flow w: a state is left w times more often than it is entered."""
-    size = part.scene.lattice.size
-    net = np.bincount(part.state, minlength=size) - np.bincount(part.target, minlength=size)
-    net[part.scene.goal] = 0  # the goal's value is zero whatever the parameters
-    return policy.visits(net.astype(float))
-
-
-def _curvature(part: SceneEvidence, jet: Jet, policy: Policy, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _curvature(steps: _Steps, jet: Jet, policy: Policy, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(k, k) covariance of the steps' gradient, and the part of the Hessian from the terms' second derivatives."""
-    weight = policy.probability * _flow(part, policy)[:, None]
+    weight = policy.probability * steps.flow(policy)[:, None]
     expected = _covariance(jet.first, policy, slope, weight)
     bend = np.zeros_like(expected)
     for (i, j), second in jet.second.items():
-        demonstrated = _at_steps([second], part).sum()
+        demonstrated = steps.features([second]).sum()
         bend[i, j] = bend[j, i] = demonstrated - float((weight * second).sum())
     return expected, bend
 
@@ -215,16 +235,19 @@ def _covariance(features: Sequence[FloatArray], policy: Policy, slope: FloatArra
         slope: (n, k) expected sums Y of the features from every state to the goal.
         weight: (n, 8) expected number of times that each step is taken.
     """
-    neighbours, k = policy.lattice.neighbours, len(features)
-    gains = np.empty((k, *weight.shape))
-    for j, (feature, one) in enumerate(zip(features, np.ascontiguousarray(slope.T), strict=True)):
-        np.take(one, neighbours, out=gains[j], mode="clip")  # impossible moves have weight 0, whatever stands here
-        gains[j] -= one[:, None]
-        gains[j] += feature
-    flat, weighted = gains.reshape(k, -1), (gains * weight).reshape(k, -1)
-    # A few long sums of products: the threads of a linear algebra library would make them slower.
+    k, slopes = len(features), np.ascontiguousarray(slope.T)
     sums = np.zeros((k, k))
-    for i in range(k):
-        for j in range(i + 1):
-            sums[i, j] = sums[j, i] = np.einsum("i,i->", flat[i], weighted[j])
-    return sums
+    for low in range(0, len(weight), BLOCK):
+        block = slice(low, low + BLOCK)
+        weights, neighbours = weight[block], policy.graph.neighbours[block]
+        gains = np.empty((k, *weights.shape))
+        for j, (feature, one) in enumerate(zip(features, slopes, strict=True)):
+            np.take(one, neighbours, out=gains[j], mode="clip")  # impossible moves have weight 0, whatever stands here
+            gains[j] -= one[block, None]
+            gains[j] += feature if len(feature) == 1 else feature[block]
+        flat, weighted = gains.reshape(k, -1), (gains * weights).reshape(k, -1)
+        # A few long sums of products: the threads of a linear algebra library would make them slower.
+        for i in range(k):
+            for j in range(i + 1):
+                sums[i, j] += np.einsum("i,i->", flat[i], weighted[j])
+    return sums + np.tril(sums, -1).T

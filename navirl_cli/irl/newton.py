@@ -57,6 +57,16 @@ class Maximum:
     path_value: FloatArray
 
 
+@dataclass(frozen=True)
+class Effort:
+    """When a search ends."""
+
+    #: Largest number of steps.
+    most: int = MAX_ITERATIONS
+    #: A predicted gain below which it has converged, nats.
+    enough: float = GAIN_TOLERANCE
+
+
 def maximise(
     objective: Callable[[FloatArray], Point],
     start: Point,
@@ -65,7 +75,7 @@ def maximise(
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
     hope: float | None = None,
-    most: int | None = None,
+    effort: Effort = Effort(),
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -78,7 +88,7 @@ def maximise(
         known: Maxima found before. The search ends early where it is converging to one of them.
         hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
             within a coarse tolerance.
-        most: Largest number of steps; by default MAX_ITERATIONS.
+        effort: When the search ends.
 
     Returns:
         The maximum and the accepted places before it.
@@ -88,7 +98,7 @@ def maximise(
     if hope is not None:
         radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
-    while len(path) <= (MAX_ITERATIONS if most is None else most) and radius > MIN_RADIUS:
+    while len(path) <= effort.most and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
             break
         if hope is not None and _settled(here, hope, bounds, free):
@@ -96,7 +106,7 @@ def maximise(
         step = _step(here, lower, upper, free, radius)
         promised = _promise(here, step)
         # A step limited by the region predicts a small gain because it is short, not because the maximum is near.
-        if promised < GAIN_TOLERANCE and np.linalg.norm(step) < 0.9 * radius:
+        if promised < effort.enough and np.linalg.norm(step) < 0.9 * radius:
             converged = True
             break
         # A variable that meets its bound is set to it exactly.

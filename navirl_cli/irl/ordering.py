@@ -1,21 +1,21 @@
-"""The states of a lattice in order of their distance to a goal, and the pattern of the matrices in that order."""
+"""The states of a graph in order of their distance to a goal, and the pattern of the matrices in that order."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray, IntArray
-from navirl_cli.demos.grid import OPPOSITE
-from navirl_cli.irl.lattice import Lattice
+from navirl_cli.irl.graph import Graph, steps_by_target
 
 
 @dataclass(frozen=True, eq=False)
 class Ordering:
     """Ranks of states by any distance to the goal; the goal has rank 0."""
 
-    lattice: Lattice
+    graph: Graph
     #: Number of the goal's state.
     goal: int
     #: (n,) distance to the goal by state: zero there, positive elsewhere; and that of the cheapest step out of each.
@@ -32,13 +32,13 @@ class Ordering:
     def rank(self) -> IntArray:
         """(n,) rank of every state."""
         rank = np.empty_like(self.order)
-        rank[self.order] = np.arange(self.lattice.size)
+        rank[self.order] = np.arange(self.graph.size)
         return rank
 
     @cached_property
     def neighbours(self) -> IntArray:
         """(n, 8) rank that each move leads to from every rank, -1 where the move is not possible."""
-        neighbours = self.lattice.neighbours[self.order]
+        neighbours = self.graph.neighbours[self.order]
         ranks: IntArray = np.where(neighbours >= 0, self.rank[neighbours], -1)
         return ranks
 
@@ -60,12 +60,13 @@ class Ordering:
     @cached_property
     def _patterns(self) -> tuple["_Pattern", "_Pattern"]:
         """Patterns of I - L (the steps that lead down, and the diagonal) by columns, and of U (the others) by rows."""
-        rank = np.arange(self.lattice.size)[:, None]
+        rank = np.arange(self.graph.size)[:, None]
         above = self.neighbours > rank
-        # The reverse of a step up is a step down: a column holds the reverses of the steps in its row.
-        reverse = self.neighbours * 8 + OPPOSITE
-        lower = _Pattern.of(self.neighbours[above], reverse[above], above.sum(axis=1), diagonal=True)
-        return lower, _Pattern.of(self.neighbours[above], np.flatnonzero(above), above.sum(axis=1))
+        down = steps_by_target(self.neighbours, ~above & (self.neighbours >= 0))
+        lower = _Pattern.with_diagonal(*down)
+        starts = np.concatenate([[0], np.cumsum(above.sum(axis=1))]).astype(np.int32)
+        up = np.flatnonzero(above)
+        return lower, _Pattern(starts, self.neighbours.ravel()[up].astype(np.int32), np.arange(len(up)), up)
 
     def split(self, weight: FloatArray) -> tuple[Any, Any]:
         """A matrix M >= 0 of steps as I - L, triangular, and the rest U, with M = L + U.
@@ -79,7 +80,7 @@ class Ordering:
         from scipy.sparse import csc_array, csr_array
 
         lower, upper = self._patterns
-        shape = (self.lattice.size, self.lattice.size)
+        shape = (self.graph.size, self.graph.size)
         # The diagonal is 1.
         entries = np.ones(len(lower.indices))
         entries[lower.places] = -weight.ravel()[lower.taken]
@@ -93,23 +94,22 @@ class Ordering:
 class _Pattern:
     """Pattern of a compressed sparse matrix whose entries are some of the steps."""
 
-    starts: IntArray
-    indices: IntArray
+    starts: NDArray[np.int32]
+    indices: NDArray[np.int32]
     #: Positions of the entries that are steps, and the flat index of each of these steps in (n, 8) arrays.
     places: IntArray
     taken: IntArray
 
     @staticmethod
-    def of(indices: IntArray, taken: IntArray, counts: IntArray, *, diagonal: bool = False) -> "_Pattern":
-        """From indices and positions of the steps in order, and their number in each row or column.
+    def with_diagonal(taken: IntArray, rows: NDArray[np.int32], starts: NDArray[np.int32]) -> "_Pattern":
+        """Of steps by column, as :func:`navirl_cli.irl.graph.steps_by_target` gives them.
 
         A diagonal entry precedes the steps. SuperLU takes integers of 32 bits.
         """
-        size = len(counts)
-        starts = np.concatenate([[0], np.cumsum(counts + int(diagonal))])
-        places = np.arange(len(indices)) + (np.repeat(np.arange(size), counts) + 1 if diagonal else 0)
-        full = np.empty(starts[-1], dtype=np.int32)
-        full[places] = indices
-        if diagonal:
-            full[starts[:-1]] = np.arange(size)
-        return _Pattern(starts.astype(np.int32), full, places, taken)
+        size = len(starts) - 1
+        places = np.arange(len(rows)) + np.repeat(np.arange(1, size + 1), np.diff(starts))
+        diagonal = (starts + np.arange(size + 1)).astype(np.int32)
+        full = np.empty(diagonal[-1], dtype=np.int32)
+        full[places] = rows
+        full[diagonal[:-1]] = np.arange(size)
+        return _Pattern(diagonal, full, places, taken)

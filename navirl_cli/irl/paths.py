@@ -16,7 +16,7 @@ PATIENCE = 1000
 class SampledPaths(ByContent):
     """Paths of a policy from a start into the goal."""
 
-    #: (paths, longest) states; after its arrival a path stays in the goal.
+    #: (paths, longest) cells of the lattice; after its arrival a path stays in the goal.
     states: IntArray
     #: (paths,) number of states up to and with the goal.
     lengths: IntArray
@@ -26,7 +26,7 @@ class SampledPaths(ByContent):
         return len(self.lengths)
 
     def path(self, number: int) -> IntArray:
-        """(k,) states of one path, start and goal included."""
+        """(k,) cells of one path, start and goal included."""
         return self.states[number, : self.lengths[number]]
 
     def joined(self, others: "SampledPaths", goal: int) -> "SampledPaths":
@@ -44,7 +44,7 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
 
     Args:
         policy: The policy.
-        start: State in which every path starts.
+        start: Cell of the lattice in which every path starts.
         count: Number of paths.
         rng: Source of randomness.
 
@@ -54,13 +54,14 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
     Raises:
         RewardError: A path does not arrive within a thousand times the expected number of steps.
     """
-    ones = np.ones(policy.lattice.size)
+    ones = np.ones(policy.graph.size)
     ones[policy.goal] = 0.0
-    limit = int(PATIENCE * policy.expected_to_goal(ones)[start]) + 100
+    begin = policy.graph.beginning_in(start)
+    limit = int(PATIENCE * policy.expected_to_goal(ones)[begin]) + 100
     # Rounding may leave the last sum below 1; no draw may exceed it.
     threshold = np.cumsum(policy.probability, axis=1)
     threshold /= np.maximum(threshold[:, -1:], 1e-300)
-    here = np.full(count, start)
+    here = np.full(count, begin)
     columns = [here]
     for _ in range(limit):
         driving = np.flatnonzero(here != policy.goal)
@@ -68,7 +69,7 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
             break
         move = (rng.random(len(driving))[:, None] >= threshold[here[driving]]).sum(axis=1)
         here = here.copy()
-        here[driving] = policy.lattice.neighbours[here[driving], move]
+        here[driving] = policy.graph.neighbours[here[driving], move]
         columns.append(here)
     else:
         raise RewardError(
@@ -76,7 +77,7 @@ def sample_paths(policy: Policy, start: int, count: int, rng: np.random.Generato
             "choose a more negative c0"
         )
     states = np.stack(columns, axis=1)
-    return SampledPaths(states, (states != policy.goal).sum(axis=1) + 1)
+    return SampledPaths(policy.graph.cells_of(states), (states != policy.goal).sum(axis=1) + 1)
 
 
 def sampled_lines_m(policy: Policy, paths: SampledPaths) -> list[FloatArray]:

@@ -7,12 +7,14 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import RewardError, unknown
+from navirl_cli.irl.graph import NO_MOVE
+from navirl_cli.irl.ordering import Ordering
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.terms.term import Jet, Parameter, Term
 
 #: The reward of the paper (Eq. 13).
-PAPER_TERMS: tuple[Term, ...] = (TERMS["step_length"], TERMS["deviation"], TERMS["personal_space"])
+PAPER_TERMS: tuple[Term, ...] = (TERMS["length"], TERMS["deviation"], TERMS["personal-space"])
 
 
 def parameters_of(terms: Iterable[Term]) -> tuple[Parameter, ...]:
@@ -37,6 +39,34 @@ def terms_with(names: Sequence[str]) -> tuple[Term, ...]:
         found.append(known[first])
         left = left[len(first) :]
     return tuple(found)
+
+
+def starting(
+    terms: Sequence[Term] = (), given: "Reward | Mapping[str, float] | None" = None, earlier: "Reward | None" = None
+) -> "Reward":
+    """The reward at which a fit starts.
+
+    Args:
+        terms: Of the reward; none for those of the given or the earlier reward, or the paper's.
+        given: Initial values, as a reward or by name. A reward of other terms gives the values of common parameters.
+        earlier: The reward of a prior, which gives the initial values if no others are given.
+
+    Raises:
+        RewardError: A name is unknown or a value out of bounds, or the prior is of other terms.
+    """
+    source = earlier if given is None else given
+    others = source.terms if isinstance(source, Reward) else PAPER_TERMS if earlier is None else earlier.terms
+    terms = tuple(terms) or others
+    if earlier is not None and earlier.terms != terms:
+        own, found = (", ".join(term.name for term in some) for some in (terms, earlier.terms))
+        raise RewardError(
+            f"`prior`: expected a reward of the terms {own}, found one of {found}; fit it with these `terms`"
+        )
+    if not isinstance(source, Reward):
+        return Reward.named(source or {}, terms)
+    names = {parameter.name for parameter in parameters_of(terms)}
+    values = zip(source.parameters, source.theta, strict=True)
+    return Reward.named({one.name: value for one, value in values if one.name in names}, terms)
 
 
 @dataclass(frozen=True)
@@ -77,36 +107,52 @@ class Reward:
         """The parameters in order."""
         return parameters_of(self.terms)
 
+    @property
+    def about_turns(self) -> bool:
+        """Whether a move's reward depends on the move before it."""
+        return any(term.about_turns for term in self.terms)
+
+    def ordering(self, scene: Scene) -> Ordering:
+        """The states that the reward needs, in order: cells, or cells by incoming move."""
+        return scene.turn_ordering if self.about_turns else scene.ordering
+
     def on(self, scene: Scene) -> Jet:
         """Value, first and second derivatives for all parameters together; zero in the absorbing goal.
 
-        Arrays as in :class:`Jet`. ``value`` is -inf where a move is not possible.
+        Arrays broadcast to (n, 8), the states of :meth:`ordering` by moves. ``value`` is -inf where a move is not
+        possible.
         """
         at = 0
-        total = np.zeros((scene.lattice.size, 8))
+        ordering = self.ordering(scene)
+        graph, goal = ordering.graph, ordering.goal
+        total = np.zeros((graph.size, 8))
         first: list[FloatArray] = []
         second: dict[tuple[int, int], FloatArray] = {}
         for term in self.terms:
             count = len(term.parameters)
             jet = term.on(scene, self.theta[at : at + count])
-            total += jet.value
-            first.extend(_closed(array, scene.goal) for array in jet.first)
-            second |= {(at + j, at + k): _closed(array, scene.goal) for (j, k), array in jet.second.items()}
+            total += graph.on_states(jet.value)
+            first.extend(_closed(graph.on_states(array), goal) for array in jet.first)
+            second |= {(at + j, at + k): _closed(graph.on_states(array), goal) for (j, k), array in jet.second.items()}
             at += count
-        total[~scene.lattice.possible] = -np.inf
-        total[scene.goal] = -np.inf
+        total[~graph.possible] = -np.inf
+        total[goal] = -np.inf
         return Jet(total, first, second)
 
     def by_cell(self, scene: Scene) -> FloatArray:
-        """(n,) the part of the reward that depends on the cell only, not on the move (Fig. 8 right)."""
+        """(n,) the part of a step's reward that depends on its cell, mean over straight steps (Fig. 8 right).
+
+        Terms that depend on the moves alone are not in it, such as the cost of path length.
+        """
         total = np.zeros(scene.lattice.size)
         at = 0
         for term in self.terms:
             count = len(term.parameters)
             value = term.on(scene, self.theta[at : at + count]).value
-            if value.shape[1] == 1:
-                total += value[:, 0]
             at += count
+            if len(value) > 1:
+                begun = value if value.ndim == 2 else np.broadcast_to(value, (len(value), 9, 8))[:, NO_MOVE]
+                total += begun[:, 0] if begun.shape[1] == 1 else begun[:, ::2].mean(axis=1)
         return total
 
 

@@ -14,6 +14,7 @@ from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import SceneError
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering
+from navirl_cli.irl.turns import TurnGraph
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,15 @@ class Scene:
         return Ordering(lattice, self.goal, lattice.costs_to(self.goal, lattice.step_m), cheapest)
 
     @cached_property
+    def turn_ordering(self) -> Ordering:
+        """The cells by incoming move (:class:`~navirl_cli.irl.turns.TurnGraph`), in the order of the cells."""
+        graph = TurnGraph.of(self.lattice, self.goal)
+        cells = self.ordering
+        return Ordering(
+            graph, graph.beginning_in(self.goal), cells.distance[graph.cell], np.full(graph.size, cells.step[0])
+        )
+
+    @cached_property
     def nominal(self) -> NDArray[np.bool_]:
         """(n,) cells on any shortest obstacle-free 8-connected path from start to goal."""
         from_start = self.lattice.costs_to(self.start, self.lattice.step_m)
@@ -91,6 +101,18 @@ class Scene:
         nominal[rows, columns] = self.nominal
         deviation: FloatArray = distances_to(nominal)[rows, columns] * self.lattice.grid.resolution_m
         return deviation
+
+    @cached_property
+    def travel_past_people(self) -> FloatArray:
+        """(p, 2) unit vectors along the nominal path (:meth:`nominal_line_m`) where it is nearest to each person."""
+        line = self.nominal_line_m()
+        begin, along = line[:-1], np.diff(line, axis=0)
+        offset = self.people_m[:, None, :] - begin[None]
+        share = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+        away = np.hypot(*np.moveaxis(offset - share[..., None] * along, 2, 0))
+        nearest = along[away.argmin(axis=1)]
+        directions: FloatArray = nearest / np.hypot(*nearest.T)[:, None]
+        return directions
 
     def nominal_line_m(self) -> FloatArray:
         """The nominal path as a line: a shortest path, made straight where no obstacle lies between.

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from navirl_cli.arrays import BoolArray
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.reach import Reach, required_reach, steps_within_reach
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.irl.evidence import Evidence, evidence_of
@@ -17,6 +18,8 @@ class Steps(StrEnum):
     ALL = "all"
     #: Those during contact.
     CONTACT = "contact"
+    #: Those during contact or within the person's reach: not pushing there is acceptance.
+    REACHABLE = "reachable"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,8 @@ class Selection:
     evidence: Evidence
     #: Side of the cells of all demonstrations, m.
     resolution_m: float
+    #: The reach that decided which steps count; None where none did.
+    reach: Reach | None = None
 
 
 def select(
@@ -37,6 +42,7 @@ def select(
     only_corrected: bool = False,
     truncated: bool = False,
     steps: Steps = Steps.ALL,
+    reach_m: float | None = None,
 ) -> Selection:
     """Choose demonstrations and collect their steps.
 
@@ -46,7 +52,10 @@ def select(
         cycle: Number of the cycle; None for all.
         only_corrected: Only demonstrations in which the person intervened.
         truncated: Also demonstrations that are cut off.
-        steps: All steps, or those during contact; demonstrations without such steps are left out.
+        steps: All steps, those during contact, or those during contact or within reach; demonstrations without such
+            steps are left out.
+        reach_m: The person's reach, centre to centre, m; None for the largest distance at which people pushed in the
+            chosen demonstrations.
 
     Returns:
         Demonstrations in their order, and their steps.
@@ -66,11 +75,22 @@ def select(
         chosen = whole(chosen)
     if only_corrected:
         chosen = _corrected(chosen)
-    masks = None
+    return with_steps(chosen, steps, reach_m)
+
+
+def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None) -> Selection:
+    """Demonstrations with those of their steps that count; arguments, result and errors as of :func:`select`."""
+    masks, reach = None, None
     if chosen and steps is Steps.CONTACT:
-        chosen, masks = _in_contact(chosen)
+        chosen, masks = _with_some(chosen, [steps_in_contact(one) for one in chosen], "contact", "a contact")
+    elif chosen and steps is Steps.REACHABLE:
+        reach = required_reach(chosen, reach_m)
+        within = [steps_within_reach(one, reach.reach_m) for one in chosen]
+        chosen, masks = _with_some(chosen, within, "reachable", "a contact or comes within reach of a person")
     evidence = evidence_of(chosen)
-    return Selection(tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen))
+    return Selection(
+        tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen), reach
+    )
 
 
 def _not_among(
@@ -117,12 +137,13 @@ def _corrected(chosen: Sequence[Demonstration]) -> list[Demonstration]:
     return [one for one in chosen if one.corrected]
 
 
-def _in_contact(chosen: Sequence[Demonstration]) -> tuple[list[Demonstration], list[BoolArray]]:
-    """Those with contacts, each with the (k - 1,) mask of its steps in contact."""
-    masks = [(one, steps_in_contact(one)) for one in chosen]
-    held = [(one, mask) for one, mask in masks if mask.any()]
+def _with_some(
+    chosen: Sequence[Demonstration], masks: Sequence[BoolArray], name: str, what: str
+) -> tuple[list[Demonstration], list[BoolArray]]:
+    """The demonstrations with a step that counts, each with the (k - 1,) mask of these steps."""
+    held = [(one, mask) for one, mask in zip(chosen, masks, strict=True) if mask.any()]
     if not held:
-        raise DemonstrationError("`steps` contact: none of the demonstrations holds a contact; learn from all steps")
+        raise DemonstrationError(f"`steps` {name}: none of the demonstrations holds {what}; learn from all steps")
     return [one for one, _ in held], [mask for _, mask in held]
 
 

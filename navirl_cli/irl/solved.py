@@ -25,4 +25,4 @@ def solved(reward: Reward, scene: Scene) -> SolvedScene:
     Raises:
         InfinitePartitionError: The reward has no policy in the scene.
     """
-    return SolvedScene(scene, policy_of(reward, scene).visits_from(scene.start), reward.by_cell(scene))
+    return SolvedScene(scene, policy_of(reward, scene).visits_by_cell(scene.start), reward.by_cell(scene))

@@ -147,8 +147,7 @@ def _started(initial: Reward, terms: tuple[Term, ...]) -> Reward:
 
 def _leave_out(evidence: Evidence, models: dict[str, Reward], l2: float, name: str) -> _LeftOut:
     """Fit every model without one participant and evaluate it on that participant."""
-    others = np.array([participant != name for participant in evidence.participants], dtype=int)
-    learning, held_out = evidence.repeated(others), evidence.repeated(1 - others)
+    learning, held_out = evidence.apart(name)
     fits = {model: fit(learning, initial, l2) for model, initial in models.items()}
     values = {model: log_likelihood(held_out, found.reward) for model, found in fits.items()}
     values["uniform"] = held_out.uniform_log_likelihood()

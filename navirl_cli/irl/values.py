@@ -13,6 +13,7 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.grid import OPPOSITE
+from navirl_cli.irl.graph import Graph
 from navirl_cli.irl.lattice import Lattice
 from navirl_cli.irl.ordering import Ordering
 from navirl_cli.irl.series import InfinitePartitionError, Splitting, ValueStatus
@@ -24,6 +25,8 @@ PLAIN_STEPS = 250
 STEPS_PER_BAND = 100.0
 #: Every climb of a best path in the order of the states costs a sweep. Beyond so many, a new order is cheaper.
 MAX_CLIMBS = 6
+#: A cell with fewer expected visits is practically never entered.
+SEEN = 1e-200
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +45,14 @@ class Policy:
     _z: FloatArray
 
     @property
-    def lattice(self) -> Lattice:
+    def graph(self) -> Graph:
         """The states."""
-        return self.ordering.lattice
+        return self.ordering.graph
+
+    @property
+    def lattice(self) -> Lattice:
+        """The cells that the states belong to."""
+        return self.graph.lattice
 
     @property
     def goal(self) -> int:
@@ -76,11 +84,45 @@ class Policy:
         by_rank = self._splitting.solve(weighed, 1 / self._z, self.sweeps, transposed=True)
         return (by_rank * self._z)[self.ordering.rank]
 
-    def visits_from(self, state: int) -> FloatArray:
-        """(n,) expected visits of a path that starts in a state: :meth:`visits` of e_start."""
-        start = np.zeros(self.lattice.size)
-        start[state] = 1.0
+    def visits_from(self, cell: int) -> FloatArray:
+        """(n,) expected visits of a path that begins in a cell: :meth:`visits` of e_start."""
+        start = np.zeros(self.graph.size)
+        start[self.graph.beginning_in(cell)] = 1.0
         return self.visits(start)
+
+    def log_likelihoods(self, cells: IntArray, moves: IntArray) -> FloatArray:
+        """Log-probabilities of moves along paths, nats; -inf where the policy never makes one.
+
+        Args:
+            cells: (..., k) numbers of the paths' cells in the lattice.
+            moves: (..., k - 1) their moves; -1 where a path stays in the goal, which has probability 1.
+        """
+        states = self.graph.along(cells, moves)
+        with np.errstate(divide="ignore"):
+            logs = np.log(self.probability[states[..., :-1], moves])
+        return np.where(moves >= 0, logs, 0.0)
+
+    def value_by_cell(self) -> FloatArray:
+        """(cells,) soft value of paths that begin in each cell."""
+        return self.graph.where_paths_begin(self.value)
+
+    def visits_by_cell(self, cell: int) -> FloatArray:
+        """(cells,) expected visits of a path that begins in a cell."""
+        return self.graph.by_cell(self.visits_from(cell))
+
+    def flow_by_cell(self, cell: int) -> FloatArray:
+        """(cells, 8) expected number of times that a path that begins in a cell takes each step."""
+        return self.graph.by_cell(self.visits_from(cell)[:, None] * self.probability)
+
+    def probability_by_cell(self, cell: int) -> FloatArray:
+        """(cells, 8) probability of each move, for a path that begins in a cell.
+
+        Where states differ by incoming move, its mean over visits. Cells that the path practically never enters have
+        the probabilities of paths that begin in them.
+        """
+        flow, begun = self.flow_by_cell(cell), self.graph.where_paths_begin(self.probability)
+        visits = flow.sum(axis=1, keepdims=True)
+        return np.where(visits > SEEN, flow / np.maximum(visits, SEEN), begun)
 
 
 def solve(ordering: Ordering, reward: FloatArray) -> Policy:
@@ -97,19 +139,20 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
     Raises:
         InfinitePartitionError: The partition function is infinite, or too close to infinite to be decided.
     """
-    lattice = ordering.lattice
+    graph = ordering.graph
     if reward.max() >= 0:
-        back = reward[lattice.neighbours, OPPOSITE]
-        if (reward + back >= 0).any():  # moving to and fro costs nothing: a cycle of weight 1 is enough
+        # Moving to and fro costs nothing: a cycle of weight 1 is enough.
+        ahead, here = graph.neighbours, np.arange(graph.size)[:, None]
+        if ((reward + reward[ahead, OPPOSITE] >= 0) & (ahead[ahead, OPPOSITE] == here)).any():
             raise InfinitePartitionError(ValueStatus.INFINITE)
     # Dijkstra needs positive costs. The result is exact for any shift, so a clipped cost is valid. No step leaves the
     # goal, so any positive cost is valid there.
-    floor = 1e-3 * float(lattice.step_m.min())
+    floor = 1e-3 * float(graph.lattice.step_m.min())
     cost = np.maximum(np.where(np.isfinite(reward), -reward, 1.0), floor)
-    hard, parent = lattice.cheapest_tree(ordering.goal, cost)
-    large = float(ordering.distance.max()) > PLAIN_STEPS * float(lattice.step_m.min())
+    hard, parent = graph.cheapest_tree(ordering.goal, cost)
+    large = float(ordering.distance.max()) > PLAIN_STEPS * float(graph.lattice.step_m.min())
     if ordering.climbs(parent) > MAX_CLIMBS:
-        ordering = Ordering(lattice, ordering.goal, hard, np.where(lattice.possible, cost, np.inf).min(axis=1))
+        ordering = Ordering(graph, ordering.goal, hard, np.where(graph.possible, cost, np.inf).min(axis=1))
     order = ordering.order
     ranked, shift = reward[order], -hard[order]
     if large:
@@ -119,7 +162,7 @@ def solve(ordering: Ordering, reward: FloatArray) -> Policy:
         shift = _raised(ordering, ranked, shift, np.where(up >= 0, ordering.rank[up], -1))
     weight = _conjugated(ordering, ranked, shift)
     splitting = Splitting.of(ordering, weight)
-    unit = np.zeros(lattice.size)
+    unit = np.zeros(graph.size)
     unit[0] = 1.0
     z, sweeps = splitting.partition(unit)
     weight *= z[ordering.neighbours]

@@ -18,10 +18,10 @@ from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.evaluation.lines import Lines
 from navirl_cli.evaluation.policy_paths import PolicyLines, Steps
+from navirl_cli.irl.graph import Graph
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.values import Policy
 from navirl_cli.planning.problem import Problem
 
@@ -70,8 +70,8 @@ class Planner:
 
     @cached_property
     def visits(self) -> FloatArray:
-        """(n,) expected visits by state."""
-        return self.policy.visits_from(self.problem.scene.start)
+        """(n,) expected visits by cell."""
+        return self.policy.visits_by_cell(self.problem.scene.start)
 
     @cached_property
     def touching(self) -> BoolArray:
@@ -115,9 +115,7 @@ class Planner:
         line = lattice.xy_m[states].copy()
         line[0], line[-1] = self.problem.start_m, self.problem.goal_m
         moves = moves_along(lattice.cells[states])
-        with np.errstate(divide="ignore"):
-            steps = np.log(self.policy.probability[states[:-1], moves])
-        return Path(states, line, float(steps.sum()))
+        return Path(states, line, float(self.policy.log_likelihoods(states, moves).sum()))
 
     def _drawn(self, count: int, rng: np.random.Generator) -> list[IntArray]:
         """States of drawn paths that touch nobody."""
@@ -138,7 +136,7 @@ class Planner:
         with np.errstate(divide="ignore"):
             cost = -np.log(self.policy.probability)
         # scipy takes a cost of zero for a missing edge
-        return self._cheapest(np.maximum(cost, 1e-300))
+        return self._cheapest(self.policy.graph, self.policy.goal, np.maximum(cost, 1e-300))
 
     def _ridge(self) -> IntArray:
         """(k,) states of the path of least length weighed by the inverse of the visits."""
@@ -146,22 +144,23 @@ class Planner:
         seldom = 1 / np.maximum(self.visits, 1e-300)
         # A step lies half in the cell that it leaves and half in the one that it enters.
         both = (seldom[:, None] + seldom[lattice.neighbours]) / 2
-        return self._cheapest(both * lattice.step_m)
+        return self._cheapest(lattice, self.problem.scene.goal, both * lattice.step_m)
 
-    def _cheapest(self, cost: FloatArray) -> IntArray:
-        """(k,) states along the cheapest path; cost (n, 8), inf or 0 where a move is not possible."""
-        scene = self.problem.scene
-        allowed = scene.lattice.possible & np.isfinite(cost) & ~self.touching[scene.lattice.neighbours]
-        total, following = scene.lattice.cheapest_tree(scene.goal, np.where(allowed, cost, np.inf))
-        if not np.isfinite(total[scene.start]):
+    def _cheapest(self, graph: Graph, goal: int, cost: FloatArray) -> IntArray:
+        """(k,) cells along the cheapest path into a state; cost (n, 8), inf or 0 where a move is not possible."""
+        start = graph.beginning_in(self.problem.scene.start)
+        entered = graph.cells_of(graph.neighbours)
+        allowed = graph.possible & np.isfinite(cost) & ~self.touching[entered]
+        total, following = graph.cheapest_tree(goal, np.where(allowed, cost, np.inf))
+        if not np.isfinite(total[start]):
             raise SceneError(
                 "people leave no free path from start to goal: the robot's shell keeps "
                 f"{PERSON_RADIUS_M:g} m to their centres; choose another goal, or wait until they move"
             )
-        path = [scene.start]
-        while path[-1] != scene.goal:
+        path = [start]
+        while path[-1] != goal:
             path.append(int(following[path[-1]]))
-        return np.array(path)
+        return graph.cells_of(np.array(path))
 
 
 def measured(problem: Problem, line_m: FloatArray) -> Lines:
@@ -170,7 +169,7 @@ def measured(problem: Problem, line_m: FloatArray) -> Lines:
 
 
 def rewards_by_term(problem: Problem, reward: Reward, states: IntArray) -> dict[str, float]:
-    """The sum of every term along a path, nats.
+    """The sum of every term along a path, nats, by the term's name.
 
     Args:
         problem: The problem.
@@ -179,13 +178,14 @@ def rewards_by_term(problem: Problem, reward: Reward, states: IntArray) -> dict[
     """
     scene = problem.scene
     moves = moves_along(scene.lattice.cells[states])
-    names = {term: name for name, term in TERMS.items()}
+    graph = reward.ordering(scene).graph
+    along = graph.along(states, moves)[:-1]
     found: dict[str, float] = {}
     at = 0
     for term in reward.terms:
         count = len(term.parameters)
         value = term.on(scene, reward.theta[at : at + count]).value
-        full = np.broadcast_to(value, (scene.lattice.size, 8))
-        found[names[term]] = float(full[states[:-1], moves].sum())
+        full = np.broadcast_to(graph.on_states(value), (graph.size, 8))
+        found[term.name] = float(full[along, moves].sum())
         at += count
     return found

@@ -13,7 +13,6 @@ from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.policy_paths import PolicyLines, Steps
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward
-from navirl_cli.irl.terms import TERMS
 from navirl_cli.planning.paths import Mode, Planner, rewards_by_term
 from navirl_cli.planning.problem import Problem, problem_on
 from navirl_cli.planning.smooth import Limits, smoothed
@@ -100,7 +99,9 @@ def _means(problem: Problem, reward: Reward) -> FloatArray:
     typical = smoothed(problem, ridge, scene.lattice.grid.resolution_m, Limits())
     people = [_of_people(problem, reward, drawn.path(number)) for number in range(len(drawn))]
     saved = float(np.mean(people)) - _of_people(problem, reward, nominal)
-    per_metre = -reward.theta[[parameter.name for parameter in reward.parameters].index("c0")]
+    names = [parameter.name for parameter in reward.parameters]
+    # Without a cost of path length no detour costs as much.
+    per_metre = -reward.theta[names.index("c0")] if "c0" in names else np.nan
     return np.array(
         [
             lines.min_distance_m.mean(),
@@ -115,4 +116,4 @@ def _means(problem: Problem, reward: Reward) -> FloatArray:
 def _of_people(problem: Problem, reward: Reward, states: IntArray) -> float:
     """The part of a path's reward that people cause, nats."""
     by_term = rewards_by_term(problem, reward, states)
-    return sum(value for name, value in by_term.items() if TERMS[name].about_people)
+    return sum(by_term[term.name] for term in reward.terms if term.about_people)

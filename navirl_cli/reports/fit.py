@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
-from navirl_cli.irl.intervals import Ends
-from navirl_cli.irl.reward import parameters_of, terms_with
+from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Ends
+from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
-from navirl_cli.irl.terms.term import Parameter
+from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
+from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -50,6 +51,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
         likelihood_table(content),
         *validation_tables(content),
         *correlation_table(content),
+        *reach_line(content),
         Paragraph(counts(content)),
     ]
 
@@ -136,7 +138,10 @@ def approximate(content: Mapping[str, Any]) -> str:
     sets = content.get("intervals", [])
     count = len(content["participants"])
     if sets and sets[0]["errors"] == "participant" and count < FEW:
-        return f"Approximate: {count} participants say little about how much people differ."
+        return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
+    if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
+        people = " If people differ they are too narrow: so few say little about that." if 1 < count < FEW else ""
+        return f"Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %.{people}"
     return ""
 
 
@@ -146,7 +151,14 @@ def _interval(lower: float | None, upper: float | None) -> Interval | None:
 
 def _parameters(content: Mapping[str, Any]) -> tuple[Parameter, ...]:
     """Units, bounds and meanings of the parameters."""
-    return parameters_of(terms_with([one["name"] for one in content["parameters"]]))
+    return parameters_of(terms_of(content))
+
+
+def formula(terms: Sequence[Term]) -> Paragraph:
+    """The reward as a sum of its terms, with what its symbols are."""
+    symbols = dict.fromkeys(sentence for term in terms for sentence in term.symbols)
+    total = " + ".join(f"`{term.formula}`" for term in terms)
+    return Paragraph(" ".join([f"The reward of a step from s to s' is {total}.", *symbols]))
 
 
 def meanings_of_parameters(content: Mapping[str, Any]) -> Bullets:
@@ -316,8 +328,21 @@ def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
     return [line]
 
 
-def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, chosen_by: tuple[str, ...]) -> list[str]:
-    """Choices that the user may not have intended, and what extraction found unusual."""
+def remarks(
+    chosen: Sequence[Demonstration],
+    earlier: LearntReward | None,
+    *,
+    chosen_by: tuple[str, ...],
+    everyone: Sequence[Demonstration] = (),
+) -> list[str]:
+    """Choices that the user may not have intended, what extraction found unusual, and what is not evidence.
+
+    Args:
+        chosen: From which the reward was learnt.
+        earlier: The prior.
+        chosen_by: Conditions that the user named.
+        everyone: Demonstrations of the file.
+    """
     lines = repeated(chosen)
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
@@ -328,14 +353,15 @@ def remarks(chosen: Sequence[Demonstration], earlier: LearntReward | None, *, ch
     twice = [] if earlier is None else sorted({d.id for d in chosen} & set(earlier.demonstrations))
     if twice:
         lines.append(f"the prior was learnt from {', '.join(twice)} too: these demonstrations count twice")
-    return lines
+    return [*lines, *evidence_remarks(chosen, everyone)]
 
 
-def warnings(content: Mapping[str, Any]) -> list[str]:
+def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
     """What a user should know before trusting the numbers.
 
     Args:
         content: Of the reward file.
+        status: Whether a status that asks for something is among it.
     """
     parameters = content["parameters"]
     names = [one["name"] for one in parameters]
@@ -354,14 +380,15 @@ def warnings(content: Mapping[str, Any]) -> list[str]:
             if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
         ]
     lines += _bias_warnings(parameters)
+    lines += reach_warnings(content)
     count = len(content["participants"])
     if 1 < count < FEW:
         lines.append(
             f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
         )
-    status = Status(content["status"])
-    if status is not Status.CONVERGED:
-        lines.append(f"{status.value}: {status.advice}")
+    ended = Status(content["status"])
+    if status and ended is not Status.CONVERGED:
+        lines.append(f"{ended.value}: {ended.advice}")
     return lines
 
 

@@ -1,10 +1,13 @@
 """What ``navirl inspect`` reports: the content of a log, and the topics that extract would use."""
 
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.documents.document import Block, Bullets, Heading
 from navirl_cli.documents.tables import Cell, Column, Table
+from navirl_cli.errors import NavirlError
 from navirl_cli.logs.overview import Flow, Overview
 from navirl_cli.logs.roles.clocks import EARLIEST_NS, NS_PER_S
 from navirl_cli.logs.roles.topics import short_name
@@ -33,7 +36,7 @@ def overview_report(view: Overview) -> list[Block]:
         if choice.topics
     )
     tables = [Table(columns, rows).without_empty() for columns, rows in ((_FLOW, flows), (_ROLE, roles)) if rows]
-    return [Heading(_name(view)), Bullets(tuple(lines)), *tables, *_verdict(view)]
+    return [Heading(_name(view)), Bullets(tuple(lines)), *tables, *_verdict(view, _outcome(view))]
 
 
 def _flow(flow: Flow, reference_s: float) -> tuple[Cell, ...]:
@@ -50,15 +53,37 @@ def _flow(flow: Flow, reference_s: float) -> tuple[Cell, ...]:
     )
 
 
-def _verdict(view: Overview) -> list[Block]:
+@dataclass(frozen=True)
+class _Outcome:
+    """What an extraction with its defaults makes of a recording."""
+
+    demonstrations: int
+    #: Why trials, or the whole log, are left out, in words.
+    reasons: tuple[str, ...]
+
+
+def _outcome(view: Overview) -> _Outcome:
+    """The extraction itself is asked, so that nothing is promised that it refuses."""
+    if view.needed or view.refusals or view.line.recording is None:
+        return _Outcome(0, view.refusals)
+    try:
+        found = extract(view.line.recording, ExtractSettings())
+    except NavirlError as error:
+        return _Outcome(0, (str(error),))
+    return _Outcome(len(found.demonstrations), found.skipped)
+
+
+def _verdict(view: Overview, outcome: _Outcome) -> list[Block]:
     """Whether extract can use the log, why not, and the missing roles, those that are needed first."""
     missing = {name: choice.problem for name, choice in view.choices.items() if not choice.topics}
     order = sorted(missing, key=lambda name: name not in view.needed)
     if view.needed:
         verdict = f"extract needs: {', '.join(view.needed)}"
     else:
-        verdict = "extract refuses this log" if view.refusals else "extract has what it needs"
-    return [Heading(verdict), Bullets((*view.refusals, *(missing[name] for name in order)))]
+        verdict = "extract has what it needs" if outcome.demonstrations else "extract refuses this log"
+    count = outcome.demonstrations
+    found = [f"{count} trial{'s' if count > 1 else ''}, each a demonstration"] if count else []
+    return [Heading(verdict), Bullets((*found, *outcome.reasons, *(missing[name] for name in order)))]
 
 
 def _name(view: Overview) -> str:
@@ -89,6 +114,7 @@ def _when(t_ns: int) -> str:
 
 def overview_document(view: Overview) -> dict[str, Any]:
     """A recording as JSON."""
+    outcome = _outcome(view)
     return {
         "log": view.source.name,
         "files": [
@@ -114,7 +140,9 @@ def overview_document(view: Overview) -> dict[str, Any]:
         "findings": list(view.findings),
         "frames": view.frames or None,
         "needed": list(view.needed),
-        "refusals": list(view.refusals),
+        "refusals": [] if view.needed or outcome.demonstrations else list(outcome.reasons),
+        "demonstrations": outcome.demonstrations,
+        "left_out": list(outcome.reasons) if outcome.demonstrations else [],
         "notes": list(view.source.notes),
         "damage": list(view.damage),
     }

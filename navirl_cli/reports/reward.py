@@ -17,12 +17,12 @@ from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Rank
-from navirl_cli.irl.reward import PAPER_TERMS
 from navirl_cli.reports.evaluation import group_table, uniform_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
     correlation_table,
+    formula,
     interval_notes,
     likelihood_table,
     meanings_of_parameters,
@@ -34,10 +34,6 @@ from navirl_cli.reports.fit import (
 )
 from navirl_cli.reports.repeated import repeated
 
-_FORMULA = (
-    "The reward of a step from s to s' is `c0 |s - s'| + a_g d(s)^2 + sum_p a_p exp(-sigma_p |s - s_p|^2)`. The sum is "
-    "over people p at the positions s_p; d is the distance from the nominal path."
-)
 _CAPTIONS = {
     "paths": "Driven paths by condition; the line is thicker where the person pushed.",
     "policy": "Expected visits of every cell under the learnt policy, and the reward of every cell.",
@@ -77,7 +73,7 @@ def report_of(
         Paragraph(_summary(demonstrations, learnt, content)),
         *_warnings(content, ranks),
         Heading("Parameters"),
-        *([Paragraph(_FORMULA)] if learnt.reward.terms == PAPER_TERMS else []),
+        formula(learnt.reward.terms),
         parameter_table(content),
         *interval_notes(content),
         meanings_of_parameters(content),
@@ -86,8 +82,7 @@ def report_of(
         *_pictures(figures, "profile"),
         *correlation_table(content),
         likelihood_table(content),
-        Heading("Meaning of the parameters in metres"),
-        Bullets(tuple(map(_sentence, _in_metres(demonstrations, learnt, seed)))),
+        *_meanings(demonstrations, learnt, seed),
         Heading("Learnt policy"),
         *_pictures(figures, "policy"),
         Heading("Path metrics"),
@@ -115,6 +110,12 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
         f"{len(learnt.demonstrations)} of them, of {people(content)}. "
         f"The fit ended with the status **{learnt.status.value}**: {learnt.status.advice}."
     )
+
+
+def _meanings(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Block]:
+    """The parameters in metres; nothing for a reward without parameters that have such a meaning."""
+    lines = tuple(map(_sentence, _in_metres(demonstrations, learnt, seed)))
+    return [Heading("Meaning of the parameters in metres"), Bullets(lines)] if lines else []
 
 
 def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Meaning]:

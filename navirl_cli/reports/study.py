@@ -16,10 +16,10 @@ from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import GroupMetrics, mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import PAPER_L2, Fit
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.reports.evaluation import DECIMALS, group_table
-from navirl_cli.reports.fit import interval_cell
+from navirl_cli.reports.fit import formula, interval_cell
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import FIRST, SECOND, CycleFit, Learnt
 from navirl_cli.study.measures import STUDY_METRICS
@@ -118,7 +118,7 @@ def report_of(study: Study, context: StudyContext) -> Report:
         Heading("Logs"),
         *_logs(context),
         Heading("Method"),
-        _method(context),
+        _method(study, context),
     ]
     return Report(f"User study with {people}", tuple(blocks), f"navirl {__version__}")
 
@@ -267,7 +267,12 @@ def _properties(groups: Sequence[GroupMetrics]) -> list[Block]:
 
 def _rewards(study: Study) -> list[Block]:
     """Parameters, and how far to rely on them."""
-    blocks: list[Block] = [_rewards_table(study), Paragraph(_ERRORS), _intervals_table(study)]
+    blocks: list[Block] = [
+        formula(study.terms),
+        _rewards_table(study),
+        Paragraph(_ERRORS),
+        _intervals_table(study),
+    ]
     pooled = study.pooled.second
     if pooled is not None and study.published_log_likelihood is not None:
         published, here = study.published_log_likelihood, len({one.participant for one in study.seconds})
@@ -288,7 +293,7 @@ def _rewards(study: Study) -> list[Block]:
 
 def _rewards_table(study: Study) -> Table:
     """Parameters by participant and cycle, pooled, and as published."""
-    parameters = Reward.named({}).parameters
+    parameters = parameters_of(study.terms)
     rows: list[tuple[Cell, ...]] = [
         _fit_row(name, found.fit, found.fit.standard_errors) for name, found in _cycles(study)
     ]
@@ -298,7 +303,7 @@ def _rewards_table(study: Study) -> Table:
     note = ""
     if study.published_log_likelihood is not None:
         name = f"published, {PUBLISHED_PARTICIPANTS} participants"
-        values = [Spread(PUBLISHED_THETA[parameter.name], float("nan")) for parameter in parameters]
+        values = [Spread(PUBLISHED_THETA.get(parameter.name, float("nan")), float("nan")) for parameter in parameters]
         rows.append((name, PUBLISHED_DEMONSTRATIONS, *values, study.published_log_likelihood, "published"))
         note = "The log-likelihood of the published parameters is that of the second cycles here."
     columns = (
@@ -336,7 +341,7 @@ def _is_weak(cycle: CycleFit) -> bool:
 
 def _intervals_table(study: Study) -> Table:
     """The intervals of the parameters by participant and cycle; an open end has no number."""
-    parameters = Reward.named({}).parameters
+    parameters = parameters_of(study.terms)
     rows: list[tuple[Cell, ...]] = []
     for name, found in _cycles(study):
         if found.intervals:
@@ -378,9 +383,9 @@ def _logs(context: StudyContext) -> list[Block]:
     return [*blocks, Bullets(tuple(context.notes))] if context.notes else blocks
 
 
-def _method(context: StudyContext) -> Bullets:
+def _method(study: Study, context: StudyContext) -> Bullets:
     """Settings that the numbers depend on."""
-    start = ", ".join(f"{p.name} = {p.initial:g} {p.unit}".strip() for p in Reward.named({}).parameters)
+    start = ", ".join(f"{p.name} = {p.initial:g} {p.unit}".strip() for p in parameters_of(study.terms))
     second = (
         "The second cycle is fitted from the first's result, all second cycles together from the same start as the "
         "first. Newton's method tries a second start of its own, so the result hardly depends on the start."
@@ -389,7 +394,7 @@ def _method(context: StudyContext) -> Bullets:
         (
             f"The first cycle of each participant is fitted from {start}.",
             second,
-            f"The paper's regulariser: {PAPER_L2 / 2:g} nats on the squares of c0/(10 /m), a_g, a_p and sigma_p.",
+            f"The paper's regulariser: {PAPER_L2 / 2:g} nats on the squares of the parameters, in units of 10 /m or 1.",
             f"{context.samples} paths were sampled from each policy in each scene, with seed {context.seed}.",
             "Cells of 10 cm, by the study's rule from poses to cells.",
         )

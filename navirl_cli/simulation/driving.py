@@ -77,6 +77,11 @@ class Drive:
         return len(self.xy_m)
 
 
+def inward_m_s(aside_m: float) -> float:
+    """Sideways velocity of the navigation at a signed distance from its path, m/s."""
+    return float(np.clip(-PULL_PER_S * aside_m, -SIDEWAYS_M_S, SIDEWAYS_M_S))
+
+
 def drive(path: Path, start_m: FloatArray, steer: Steering, speed_m_s: float = FORWARD_M_S) -> Drive:
     """Drive along a path to its end.
 
@@ -96,7 +101,7 @@ def drive(path: Path, start_m: FloatArray, steer: Steering, speed_m_s: float = F
         progress = path.nearest(here, progress, window=12)
         aside = np.array([-path.tangent[progress, 1], path.tangent[progress, 0]])
         error = float((here - path.xy_m[progress]) @ aside)
-        inward = float(np.clip(-PULL_PER_S * error, -SIDEWAYS_M_S, SIDEWAYS_M_S))
+        inward = inward_m_s(error)
         command = steer(step * STEP_S, here)
         commands.append(command)
         left = float(np.hypot(*(path.xy_m[-1] - here)))

@@ -19,6 +19,7 @@ from navirl_cli.logs.messages.writer import LogWriter, header, message_type, pla
 from navirl_cli.logs.recording import SESSION_RECORD
 from navirl_cli.parallel import map_in_order
 from navirl_cli.simulation import protocol, sensors
+from navirl_cli.simulation.behaviour import Behaviour
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
 from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M
 from navirl_cli.simulation.person import STICK_M_S
@@ -95,6 +96,7 @@ def write_logs(
     seed: int,
     *,
     force: bool,
+    behaviour: Behaviour | None = None,
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
 ) -> list[Simulated]:
@@ -105,6 +107,7 @@ def write_logs(
         participants: Number of participants.
         seed: Of the study.
         force: Replace existing files.
+        behaviour: How people intervene.
         progress: Called with the number of logs written and the name of the last.
         executor: Where to simulate; by default local processes.
 
@@ -116,33 +119,36 @@ def write_logs(
     with new_folder(folder):
         for _, path in jobs:
             check_writable(path, force=force)
-        for one in map_in_order(partial(_simulated, seed=seed, force=force), jobs, executor):
+        for one in map_in_order(partial(_simulated, seed=seed, behaviour=behaviour, force=force), jobs, executor):
             written.append(one)
             if progress is not None:
                 progress(len(written), one.path.name)
     return written
 
 
-def _simulated(job: tuple[int, FilePath], seed: int, *, force: bool) -> Simulated:
+def _simulated(job: tuple[int, FilePath], seed: int, behaviour: Behaviour | None, *, force: bool) -> Simulated:
     """Write the log of one participant."""
     number, path = job
-    session = write_log(number, seed, path, force=force)
+    session = write_log(number, seed, path, behaviour, force=force)
     return Simulated(path, len(session.passes), path.stat().st_size)
 
 
-def write_log(number: int, seed: int, path: FilePath, *, force: bool) -> protocol.Session:
+def write_log(
+    number: int, seed: int, path: FilePath, behaviour: Behaviour | None = None, *, force: bool
+) -> protocol.Session:
     """Simulate a participant and write the log.
 
     Args:
         number: Of the participant, from 1.
         seed: Of the study.
         path: The log to write.
+        behaviour: How the person intervenes.
         force: Whether to replace an existing file.
 
     Returns:
         The session.
     """
-    session = protocol.session(number, seed)
+    session = protocol.session(number, seed, behaviour)
     line = lay_out(session)
     rng = np.random.default_rng([seed, number, 1])
     t_ns = EPOCH_NS + number * HOUR_NS + np.arange(line.steps, dtype=np.int64) * round(STEP_S * 1e9)
@@ -287,12 +293,13 @@ def _write_transforms(writer: LogWriter, correction: sensors.Poses, odometry: se
 def _truth(
     session: protocol.Session, line: Timeline, t_ns: IntArray, happened: tuple[FloatArray, FloatArray]
 ) -> dict[str, Any]:
-    """The truth, for tests: parameters, and of each pass positions and forces every 10 ms."""
+    """The truth, for tests: parameters, what differs from the default behaviour, and the passes every 10 ms."""
     xy, force = happened
     names = [parameter.name for parameter in session.truth.parameters]
     return {
         "theta": dict(zip(names, session.truth.theta, strict=True)),
         "theta_learnt_between_cycles": dict(zip(names, session.learnt.theta, strict=True)),
+        **({"behaviour": changed} if (changed := session.behaviour.changed()) else {}),
         "step_s": STEP_S,
         "trials": [
             {

@@ -1,6 +1,6 @@
 """One participant's session (Sec. IV-C): two cycles of pushing with a fit between, joystick, obstacle avoidance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m
 from navirl_cli.simulation import person
+from navirl_cli.simulation.behaviour import Behaviour, Displeasure
 from navirl_cli.simulation.driving import STEP_S, Drive, Path, Steering, drive
 from navirl_cli.simulation.hallway import (
     GOAL_X_M,
@@ -38,6 +39,8 @@ class Pass:
     cycle: int | None
     plan: Path
     drive: Drive
+    #: What the person wanted; None where nobody steered.
+    wanted: Path | None = None
 
     @property
     def steering(self) -> FloatArray:
@@ -56,29 +59,48 @@ class Session:
     #: The reward learnt after the first cycle.
     learnt: Reward
     passes: tuple[Pass, ...]
+    behaviour: Behaviour = field(default_factory=Behaviour)
 
 
-def session(number: int, seed: int) -> Session:
+@dataclass(frozen=True, eq=False)
+class Someone:
+    """A person in their hallway."""
+
+    hallway: Hallway
+    truth: Reward
+    behaviour: Behaviour
+    rng: np.random.Generator
+
+    def hand(self, wanted: Path, plan: Path, scene: Scene, *, on_robot: bool) -> Steering:
+        """Their hand during a pass."""
+        judged = None if self.behaviour.tolerance_nats == 0 else Displeasure.of(self.truth, scene, plan)
+        return person.Hand(wanted, self.hallway.person_m, self.rng, on_robot, self.behaviour, judged, plan)
+
+
+def session(number: int, seed: int, behaviour: Behaviour | None = None) -> Session:
     """Simulate a participant's session.
 
     Args:
         number: Of the participant, from 1.
         seed: Of the whole study; the same seed gives the same session.
+        behaviour: How the person intervenes.
     """
+    behaviour = behaviour or Behaviour()
     rng = np.random.default_rng([seed, number])
     hallway = Hallway.with_person(rng)
-    truth = person.personal_reward(rng)
-    first = [_pushed(hallway, truth, _nominal(), offset, 1, rng) for offset in _either_first(rng)]
-    demonstrations = [_as_demonstration(hallway, one, f"{number}/{i}") for i, one in enumerate(first)]
+    truth = person.personal_reward(rng, behaviour.scatter)
+    someone = Someone(hallway, truth, behaviour, rng)
+    first = [pushed(someone, nominal_path(), offset, 1) for offset in _either_first(rng)]
+    demonstrations = [as_demonstration(hallway, one, f"{number}/{i}") for i, one in enumerate(first)]
     exact = fit(evidence_of(demonstrations), Reward.named({})).reward.theta
     # six digits: the last ones differ between machines, and a sampled path could pass on the other side
     learnt = Reward(tuple(float(f"{value:.6g}") for value in exact))
-    scene = _scene(hallway, 0.0)
-    second = [_pushed(hallway, truth, person.sampled_path(scene, learnt, rng), 0.0, 2, rng) for _ in range(2)]
-    joystick = [_steered(hallway, truth, rng) for _ in range(2)]
+    scene = scene_of(hallway, 0.0)
+    second = [pushed(someone, person.sampled_path(scene, learnt, rng), 0.0, 2) for _ in range(2)]
+    joystick = [steered(someone) for _ in range(2)]
     around = Path.along(avoidance_line_m(scene, ROBOT_RADIUS_M + PERSON_RADIUS_M), person.SMOOTHING_M / 2)
     alone = Pass(Condition.AUTONOMOUS, None, around, drive(around, around.xy_m[0], person.no_hand))
-    return Session(f"p{number:02d}", hallway, truth, learnt, (*first, *second, *joystick, alone))
+    return Session(f"p{number:02d}", hallway, truth, learnt, (*first, *second, *joystick, alone), behaviour)
 
 
 def drive_back(from_m: FloatArray, to_m: FloatArray) -> Drive:
@@ -99,35 +121,36 @@ def _either_first(rng: np.random.Generator) -> tuple[float, float]:
     return (OFFSET_M, -OFFSET_M) if rng.random() < 0.5 else (-OFFSET_M, OFFSET_M)
 
 
-def _nominal() -> Path:
+def nominal_path() -> Path:
     """The straight path."""
     return Path.along(np.array([(START_X_M, LANE_Y_M), (GOAL_X_M, LANE_Y_M)]))
 
 
-def _scene(hallway: Hallway, offset_m: float) -> Scene:
+def scene_of(hallway: Hallway, offset_m: float) -> Scene:
     """The hallway's scene from a start aside of the nominal path."""
     ends = hallway.free.cells_of([(START_X_M, LANE_Y_M + offset_m), (GOAL_X_M, LANE_Y_M)])
     return Scene.on(hallway.free, ends[0], ends[1], hallway.person_m[None])
 
 
-def _pushed(hallway: Hallway, truth: Reward, plan: Path, offset_m: float, cycle: int, rng: np.random.Generator) -> Pass:
+def pushed(someone: Someone, plan: Path, offset_m: float, cycle: int) -> Pass:
     """A pass in which the person may push the robot off its plan."""
-    side = person.side_of(plan.xy_m, hallway.person_m) if cycle > 1 else offset_m
-    wanted = person.sampled_path(_scene(hallway, offset_m), truth, rng, side)
-    hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=True)
+    side = person.side_of(plan.xy_m, someone.hallway.person_m) if cycle > 1 else offset_m
+    scene = scene_of(someone.hallway, offset_m)
+    wanted = person.sampled_path(scene, someone.truth, someone.rng, side)
+    hand = someone.hand(wanted, plan, scene, on_robot=True)
     start = np.array([START_X_M, LANE_Y_M + offset_m])
-    return Pass(Condition.FORCE, cycle, plan, drive(plan, start, hand))
+    return Pass(Condition.FORCE, cycle, plan, drive(plan, start, hand), wanted)
 
 
-def _steered(hallway: Hallway, truth: Reward, rng: np.random.Generator) -> Pass:
+def steered(someone: Someone) -> Pass:
     """A pass in which the person corrects the straight path with a joystick."""
-    plan = _nominal()
-    wanted = person.sampled_path(_scene(hallway, 0.0), truth, rng)
-    hand: Steering = person.Hand(wanted, hallway.person_m, rng, on_robot=False)
-    return Pass(Condition.JOYSTICK, None, plan, drive(plan, plan.xy_m[0], hand))
+    plan, scene = nominal_path(), scene_of(someone.hallway, 0.0)
+    wanted = person.sampled_path(scene, someone.truth, someone.rng)
+    hand = someone.hand(wanted, plan, scene, on_robot=False)
+    return Pass(Condition.JOYSTICK, None, plan, drive(plan, plan.xy_m[0], hand), wanted)
 
 
-def _as_demonstration(hallway: Hallway, one: Pass, name: str) -> Demonstration:
+def as_demonstration(hallway: Hallway, one: Pass, name: str) -> Demonstration:
     """A pass as evidence for the fit between the cycles."""
     xy = one.drive.xy_m[::3]
     cells = rasterize(xy, hallway.free)

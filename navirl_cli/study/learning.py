@@ -15,7 +15,8 @@ from navirl_cli.irl.analyses import Questions, answers
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.intervals import Intervals
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import PAPER_TERMS, Reward
+from navirl_cli.irl.terms.term import Term
 
 FIRST, SECOND = 1, 2
 
@@ -64,6 +65,8 @@ class Job:
     samples: int
     #: Seed of the sampled paths.
     seed: tuple[int, ...]
+    #: Of the reward.
+    terms: tuple[Term, ...] = PAPER_TERMS
 
     def of_cycle(self, cycle: int) -> list[Demonstration]:
         """The demonstrations of one force cycle."""
@@ -82,23 +85,25 @@ def people_of(demonstrations: Sequence[Demonstration]) -> list[str]:
     )
 
 
-def jobs_of(demonstrations: Sequence[Demonstration], samples: int, seed: int) -> list[Job]:
+def jobs_of(
+    demonstrations: Sequence[Demonstration], samples: int, seed: int, terms: tuple[Term, ...] = PAPER_TERMS
+) -> list[Job]:
     """One job a participant, and last one for the second cycles of all."""
     taught = [one for one in demonstrations if is_of_cycle(one, FIRST) or is_of_cycle(one, SECOND)]
     people = people_of(taught)
     own = [
-        Job(name, tuple(one for one in taught if one.participant == name), samples, (seed, number))
+        Job(name, tuple(one for one in taught if one.participant == name), samples, (seed, number), terms)
         for number, name in enumerate(people)
     ]
     seconds = tuple(one for one in taught if is_of_cycle(one, SECOND))
-    return [*own, Job(None, seconds, samples, (seed, len(people)))]
+    return [*own, Job(None, seconds, samples, (seed, len(people)), terms)]
 
 
 def learn(job: Job) -> Learnt:
-    """Fit the first cycle from the study's initial parameters, the second warm-started from it, and compare paths."""
+    """Fit the first cycle from the initial parameters, the second warm-started from it, and compare paths."""
     rng = np.random.default_rng(job.seed)
     seconds = job.of_cycle(SECOND)
-    reward = Reward.named({})
+    reward = Reward.named({}, job.terms)
     found: dict[int, CycleFit] = {}
     problems = []
     for cycle in (FIRST, SECOND):

@@ -9,7 +9,8 @@ from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import log_likelihood
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import PAPER_TERMS, Reward
+from navirl_cli.irl.terms.term import Term
 from navirl_cli.parallel import map_in_order
 from navirl_cli.study.claims import Claim, claims_of
 from navirl_cli.study.learning import SECOND, Learnt, is_of_cycle, jobs_of, learn
@@ -42,6 +43,8 @@ class Study:
     claims: tuple[Claim, ...]
     #: Times in which the obstacle course was completed, s, by modality and participant.
     completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]
+    #: Of the learnt rewards.
+    terms: tuple[Term, ...] = PAPER_TERMS
 
     @property
     def seconds(self) -> list[Demonstration]:
@@ -55,6 +58,7 @@ def study_of(
     samples: int,
     seed: int,
     *,
+    terms: tuple[Term, ...] = PAPER_TERMS,
     published: Collection[str] = (),
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
@@ -66,6 +70,7 @@ def study_of(
         completion_s: Times in which the obstacle course was completed, s, by modality and participant.
         samples: Paths to sample from every learnt policy in every scene.
         seed: Of the sampling; the same seed gives the same numbers, whatever the number of processes.
+        terms: Of the rewards.
         published: Participants of the published study, with whom its parameters can be compared.
         progress: Called with the number of fits done and whose was the last.
         executor: Where to run; by default local processes.
@@ -77,7 +82,7 @@ def study_of(
     if not any(is_of_cycle(one, SECOND) for one in demonstrations):
         raise _refusal(demonstrations)
     learnt: list[Learnt] = []
-    for one in map_in_order(learn, jobs_of(demonstrations, samples, seed), executor):
+    for one in map_in_order(learn, jobs_of(demonstrations, samples, seed, terms), executor):
         learnt.append(one)
         if progress is not None:
             progress(len(learnt), one.participant or "all")
@@ -92,6 +97,7 @@ def study_of(
         published_log_likelihood=_published_log_likelihood(demonstrations, published),
         claims=tuple(claims_of(rows, participants)),
         completion_s=completion_s,
+        terms=terms,
     )
 
 

@@ -56,7 +56,12 @@ class Sight:
     @cached_property
     def visits(self) -> "FloatArray":
         """(n,) expected visits of every state."""
-        return self.policy.visits_from(self.scene.start)
+        return self.policy.visits_by_cell(self.scene.start)
+
+    @property
+    def moves(self) -> "FloatArray":
+        """(n, 8) probability of each move in every state."""
+        return self.policy.probability_by_cell(self.scene.start)
 
     @property
     def options(self) -> "CellOptions":
@@ -146,7 +151,8 @@ def policy(page: Page, sight: Sight) -> None:
 def reward(page: Page, sight: Sight) -> None:
     """Draw the learnt reward of every cell.
 
-    As in Fig. 8 of the paper, right, with the nominal path. The cost of path length is not in it.
+    As in Fig. 8 of the paper, right, with the nominal path. What depends on the moves alone is not in it: the cost of
+    path length and of turns.
     """
     from navirl_cli.figures.cells import draw_reward
 
@@ -171,7 +177,7 @@ def value(page: Page, sight: Sight) -> None:
     """
     from navirl_cli.figures.values import draw_value
 
-    page.draw(lambda axes: draw_value(axes[0], sight.scene, sight.policy.value, **sight.options))
+    page.draw(lambda axes: draw_value(axes[0], sight.scene, sight.policy.value_by_cell(), **sight.options))
 
 
 @click.command(
@@ -189,4 +195,4 @@ def actions(page: Page, sight: Sight) -> None:
     """
     from navirl_cli.figures.actions import draw_actions
 
-    page.draw(lambda axes: draw_actions(axes[0], sight.scene, sight.policy.probability, **sight.options))
+    page.draw(lambda axes: draw_actions(axes[0], sight.scene, sight.moves, **sight.options))

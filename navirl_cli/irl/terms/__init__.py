@@ -2,14 +2,23 @@
 
 from collections.abc import Mapping
 
+from navirl_cli.irl.terms.anisotropic_space import AnisotropicSpace
 from navirl_cli.irl.terms.deviation import Deviation
+from navirl_cli.irl.terms.length_space import LengthSpace
 from navirl_cli.irl.terms.personal_space import PersonalSpace
+from navirl_cli.irl.terms.saturating_deviation import SaturatingDeviation
 from navirl_cli.irl.terms.step_length import StepLength
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.irl.terms.turn import Turn
 
-#: Every term by the name of its file.
-TERMS: Mapping[str, Term] = {
-    "step_length": StepLength(),
-    "deviation": Deviation(),
-    "personal_space": PersonalSpace(),
-}
+_ALL: tuple[Term, ...] = (
+    StepLength(),
+    Deviation(),
+    PersonalSpace(),
+    SaturatingDeviation(),
+    AnisotropicSpace(),
+    LengthSpace(),
+    Turn(),
+)
+#: Every term of the package by its name.
+TERMS: Mapping[str, Term] = {term.name: term for term in _ALL}

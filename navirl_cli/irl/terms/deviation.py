@@ -11,6 +11,10 @@ from navirl_cli.irl.terms.term import Jet, Parameter
 class Deviation:
     """Each step costs the squared distance of its cell to the nominal path."""
 
+    name = "deviation"
+    formula = "a_g d(s)^2"
+    symbols = ("d is the distance from the nominal path.",)
+
     parameters = (
         Parameter(
             "a_g",
@@ -23,6 +27,7 @@ class Deviation:
         ),
     )
     about_people = False
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivative by cell."""

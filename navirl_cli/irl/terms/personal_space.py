@@ -13,6 +13,10 @@ from navirl_cli.irl.terms.term import Jet, Parameter, geometric
 class PersonalSpace:
     """Each step near people has a cost; the costs of several people add up."""
 
+    name = "personal-space"
+    formula = "sum_p a_p exp(-sigma_p |s - s_p|^2)"
+    symbols = ("The sum is over people p at the positions s_p.",)
+
     parameters = (
         Parameter(
             "a_p", "", lower=-1e4, upper=1e4, scale=1.0, initial=-5.0, meaning="reward per step at a person's place"
@@ -29,6 +33,7 @@ class PersonalSpace:
         ),
     )
     about_people = True
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives by cell."""

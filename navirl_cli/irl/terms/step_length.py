@@ -11,10 +11,15 @@ from navirl_cli.irl.terms.term import Jet, Parameter
 class StepLength:
     """Each step costs its length."""
 
+    name = "length"
+    formula = "c0 |s - s'|"
+    symbols = ()
+
     parameters = (
         Parameter("c0", "1/m", lower=-1e4, upper=-1e-2, scale=10.0, initial=-50.0, meaning="reward per metre driven"),
     )
     about_people = False
+    about_turns = False
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivative by move."""

@@ -38,8 +38,9 @@ def geometric(low: float, high: float, count: int) -> tuple[float, ...]:
 class Jet:
     """Value and derivatives of a term on a scene.
 
-    Every array broadcasts to (n, 8), states by moves: (n, 1) for what depends on the cell that is left, (1, 8) for what
-    depends on the move alone.
+    Every array broadcasts to (n, 8), cells by moves: (n, 1) for what depends on the cell that is left, (1, 8) for what
+    depends on the move alone. Arrays of terms about turns broadcast to (n, 9, 8): cells, incoming moves (the last one
+    for paths that begin in the cell), moves.
     """
 
     value: FloatArray
@@ -53,12 +54,28 @@ class Term(Protocol):
     """A term of the reward: a frozen dataclass, so that equal terms compare equal."""
 
     @property
+    def name(self) -> str:
+        """Its name on the command line and in files: lower-case letters, digits and hyphens."""
+
+    @property
+    def formula(self) -> str:
+        """Its value for a step from s to s', as the report prints it."""
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Sentences on what its formula contains besides its parameters, s and s'."""
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The term's parameters in order. No two terms share a name."""
 
     @property
     def about_people(self) -> bool:
         """Whether it depends on people; a model without people leaves it out."""
+
+    @property
+    def about_turns(self) -> bool:
+        """Whether it depends on the move before, so that states are cells by incoming move."""
 
     def on(self, scene: Scene, theta: Sequence[float]) -> Jet:
         """Value and derivatives with respect to the term's parameters, in reward per step."""

@@ -1,0 +1,87 @@
+"""``navirl models``: several rewards side by side."""
+
+from pathlib import Path
+
+import click
+
+from navirl_cli.commands.learning import l2_option, selection_options, terms_option
+from navirl_cli.commands.shared import (
+    demonstrations_in,
+    demos_argument,
+    echo,
+    echo_json,
+    finish,
+    json_option,
+    progress_bar,
+    say,
+)
+from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.documents.text import to_text
+from navirl_cli.irl.models import MODELS, compare_models
+from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.terms.term import Term
+from navirl_cli.reports.fit import cannot_learn
+from navirl_cli.reports.models import models_document, models_lost, models_remarks, models_report
+
+
+@click.command(
+    cls=Command,
+    examples=[
+        Example("One condition and cycle", "navirl models demos.json --condition force --cycle 2"),
+        Example(
+            "Two models besides the paper's",
+            "navirl models demos.json --cycle 2 --terms length,personal-space --terms length,deviation,length-space",
+        ),
+    ],
+)
+@demos_argument
+@selection_options
+@section(
+    "Models",
+    terms_option(
+        "models",
+        multiple=True,
+        help="Compare this sum of terms with the paper's, instead of the sums that navirl knows; repeatable. Terms are "
+        "named as for navirl fit.",
+    ),
+    l2_option,
+)
+@section("Output", json_option)
+def models(
+    demos: Path,
+    conditions: tuple[str, ...],
+    cycle: int | None,
+    only_corrected: bool,
+    truncated: bool,
+    steps: str,
+    reach: float | None,
+    models: tuple[tuple[Term, ...], ...],
+    l2: float,
+    as_json: bool,
+) -> None:
+    """Compare rewards by how well they predict participants from whom they were not learnt.
+
+    Each model is fitted to all participants but one and predicts the steps of that one, for each participant in turn.
+    """
+    selected = select(
+        demonstrations_in(demos),
+        conditions=conditions,
+        cycle=cycle,
+        only_corrected=only_corrected,
+        truncated=truncated,
+        steps=Steps(steps),
+        reach_m=reach,
+    )
+    for line in cannot_learn(selected.demonstrations):
+        say(line)
+    chosen = models or MODELS
+    people = len(selected.evidence.several_people("models"))
+    with progress_bar("fit", (people + 1) * len(chosen)) as update:
+        found = compare_models(selected.evidence, chosen, l2, progress=update)
+    if as_json:
+        echo_json(models_document(found, l2))
+    else:
+        echo(to_text(models_report(found)))
+    for line in models_remarks(found):
+        say(line)
+    finish(models_lost(found))
