@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from navirl_cli import __version__
+from navirl_cli import __version__, limits
 from navirl_cli.commands.lazy import LazyGroup
 from navirl_cli.commands.usage import Example, as_options
 from navirl_cli.documents.inline import printable
@@ -78,12 +78,15 @@ class _Root(LazyGroup):
 )
 @click.version_option(__version__, prog_name="navirl")
 @click.option("--debug", is_flag=True, help="Show the traceback of expected errors too.")
-def cli(debug: bool) -> None:
+@click.option("--no-limits", is_flag=True, help="Read files that unpack to much more than their own size.")
+def cli(debug: bool, no_limits: bool) -> None:  # noqa: ARG001 - the group reads it
     """Learn how a robot should drive around people from people who push it.
 
     Exit codes: 0 done; 1 error in the data or files; 2 wrong usage; 3 done, but some data was lost or skipped; 130
     interrupted; 143 terminated.
     """
+    if no_limits:
+        os.environ[limits.VARIABLE] = "1"
 
 
 def main() -> None:

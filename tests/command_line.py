@@ -26,4 +26,5 @@ def options(command: click.Command) -> list[click.Option]:
 
 def option_names() -> set[str]:
     """The long names of all options of all commands."""
-    return {name for _, command in commands() for option in options(command) for name in option.opts if name[1] == "-"}
+    everywhere = [cli, *(command for _, command in commands())]
+    return {name for command in everywhere for option in options(command) for name in option.opts if name[1] == "-"}

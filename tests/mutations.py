@@ -1,4 +1,7 @@
-"""Mutations that break a log; a number always gives the same broken log."""
+"""Mutations that break a log; a number always gives the same broken log.
+
+Here are those of its bytes; `structured` has those of its structure.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -6,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.random import Generator
 from small_logs import IntactLog, compressed
+from structured import rewritten
 
 EXTREMES = (0, 1, 2, 3, 0x7F, 0xFF, 0x7FFF, 0xFFFF, *(2**k + d for k in (28, 31, 32, 63) for d in (-1, 0)), 2**64 - 1)
 
@@ -144,20 +148,37 @@ class Mutant:
     data: bytes
     #: Names of the mutations.
     what: str
+    #: Where the structure was changed and CRCs are right: the records of all chunks without compression.
+    records: bytes | None = None
+
+
+#: Share of the broken logs whose structure is changed, and of those whose bytes are changed after that.
+STRUCTURED_SHARE, BOTH_SHARE = 0.5, 0.15
 
 
 def mutant(number: int, logs: Sequence[IntactLog], seed: int = 0) -> Mutant:
-    """The broken log of a number: one to five mutations of one of the logs."""
+    """The broken log of a number: one to five mutations of one of the logs, of its structure or of its bytes."""
     rng = np.random.default_rng((seed, number))
     chosen = logs[number % len(logs)]
+    count = (1, 1, 1, 1, 1, 2, 2, 3, 4, 5)[int(rng.integers(10))]
+    if rng.random() < STRUCTURED_SHARE:
+        new, records, done = rewritten(chosen, logs, rng, count)
+        if rng.random() < BOTH_SHARE:
+            new, more = _broken(Breaking(chosen, logs, rng, bytearray(new)), 1)
+            done, records = done + more, None
+        return Mutant(number, chosen, compressed(new, chosen.compression), ", ".join(done), records)
     # of a compressed file, either what is stored or what it decompresses to is broken
     outside = chosen.compression and rng.random() < 0.5
-    breaking = Breaking(chosen, logs, rng, bytearray(chosen.stored if outside else chosen.data))
-    for _ in range((1, 1, 1, 1, 1, 2, 2, 3, 4, 5)[breaking.number(0, 10)]):
+    data, done = _broken(Breaking(chosen, logs, rng, bytearray(chosen.stored if outside else chosen.data)), count)
+    return Mutant(number, chosen, data if outside else compressed(data, chosen.compression), ", ".join(done))
+
+
+def _broken(breaking: Breaking, count: int) -> tuple[bytes, list[str]]:
+    """The bytes after some mutations, and the names of these."""
+    for _ in range(count):
         if not breaking.data:
             break
         mutation = MUTATIONS[breaking.number(0, len(MUTATIONS))]
         mutation(breaking)
         breaking.done.append(mutation.__name__)
-    data = bytes(breaking.data)
-    return Mutant(number, chosen, data if outside else compressed(data, chosen.compression), ", ".join(breaking.done))
+    return bytes(breaking.data), breaking.done

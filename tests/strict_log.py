@@ -193,11 +193,11 @@ def _walk(data: bytes, found: StrictLog) -> None:
     (crc,) = struct.unpack_from("<I", data[found.records[-1].contents])
     if crc and crc != zlib.crc32(data[: found.records[-1].start]):
         raise FaultError("the CRC of the data is wrong")
+    if summary_start and not (summary_crc and zlib.crc32(data[summary_start : tail.start + 25]) != summary_crc):
+        _take_summary(data, summary_start, tail.start, found)
     for number in {message.channel for message in found.messages}:
         if number not in found.channels or found.channels[number][0] not in {0, *found.schemas}:
             raise FaultError(f"channel {number} or its schema is not defined")
-    if summary_start and not (summary_crc and zlib.crc32(data[summary_start : tail.start + 25]) != summary_crc):
-        _take_summary(data, summary_start, tail.start, found)
 
 
 def _take(data: bytes, record: Record, found: StrictLog) -> None:
@@ -257,17 +257,23 @@ def _define(
 
 
 def _take_summary(data: bytes, start: int, stop: int, found: StrictLog) -> None:
-    """Add the summary section, or nothing of it where it has a fault."""
+    """Add the summary section, or nothing of it where it has a fault; it defines what the data section does not."""
+    schemas: dict[int, tuple[str, str, bytes]] = {}
+    channels: dict[int, tuple[int, str, str]] = {}
     try:
         records = list(records_in(data, start, stop))
         for record in records:
             content = data[record.contents]
+            if record.code in {SCHEMA, CHANNEL}:
+                _define(record.code, content, schemas, channels)
             if record.code == STATISTICS:
                 (size,) = struct.unpack_from("<I", content, 42)
                 found.counted = dict(struct.iter_unpack("<HQ", content[46 : 46 + size]))
     except (FaultError, struct.error, ValueError):
         found.counted = {}
         return
+    found.schemas = schemas | found.schemas
+    found.channels = channels | found.channels
     found.records += records
 
 

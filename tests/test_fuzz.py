@@ -12,6 +12,7 @@ import verdicts
 from fuzzing import Tally, judge_logs, logs, truth
 from mutations import MUTATIONS, Mutant, mutant
 from strict_log import FaultError
+from structured import STRUCTURED
 from verdicts import ForbiddenError, check_hits, judge
 
 from navirl_cli.errors import LogError
@@ -44,7 +45,9 @@ def test_a_number_always_breaks_the_same_log_in_the_same_way():
     assert [mutant(k, logs()) for k in range(40)] == [mutant(k, logs()) for k in range(40)]
     assert mutant(3, logs()).data != mutant(3, logs(), seed=1).data
     many = [mutant(k, logs()) for k in range(400)]
-    assert {word for one in many for word in one.what.split(", ")} == {one.__name__ for one in MUTATIONS}
+    assert {word for one in many for word in one.what.split(", ")} == {
+        one.__name__ for one in (*MUTATIONS, *STRUCTURED)
+    }
     assert sum(one.data == one.log.stored for one in many) < 20
 
 

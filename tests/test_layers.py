@@ -11,7 +11,7 @@ PACKAGE = Path(navirl_cli.__file__).parent
 #: By folder, from the bottom up; rooms of one line do not know each other.
 ORDERS = {
     "navirl_cli": [
-        ["__init__", "arrays", "errors"],
+        ["__init__", "arrays", "errors", "limits"],
         ["files", "parallel", "documents"],
         ["logs"],
         ["demos"],

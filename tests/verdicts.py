@@ -28,7 +28,7 @@ from small_logs import IntactLog
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.errors import NavirlError
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.messages.reader import ReadResult, Series, read, scan
+from navirl_cli.logs.messages.reader import Contents, ReadResult, Series, read, scan
 from navirl_cli.logs.overview import overview
 from navirl_cli.logs.recording import Recording
 from navirl_cli.logs.sources import Source
@@ -73,6 +73,7 @@ class Truth:
     #: By topic.
     types: dict[str, MessageType]
     counts: Counter[tuple[str, str]]
+    contents: Contents
     recording: Recording
 
 
@@ -95,7 +96,8 @@ def truth_of(log: IntactLog, folder: Path) -> Truth:
     assert len(extract(recording, ExtractSettings()).demonstrations) == 1, log.name
     rows = {topic: rows_of(series) for topic, series in result.series.items()}
     types = dict(type_of(number, log.strict) for number in log.strict.channels)
-    truth = Truth(log, result.series, rows, {}, types, counts_of(scan(path)), recording)
+    contents = scan(path)
+    truth = Truth(log, result.series, rows, {}, types, counts_of(contents), contents, recording)
     assert rows == expected_rows(truth, log.strict, result.series), log.name
     for topic, found in rows.items():
         for message, (_, columns) in zip(in_order(log, topic), found, strict=True):
@@ -172,7 +174,7 @@ def reported_or_right(mutant: Mutant, truth: Truth, result: ReadResult) -> str:
         data = strict_log.decompressed(mutant.data)
         strict = strict_log.walk(data)
     except strict_log.FaultError as fault:
-        check_hits(truth, rows, data, fault)
+        check_hits(truth, rows, data, fault, mutant.records)
         return "payloads hit"
     right = expected_rows(truth, strict, result.series)
     if rows != right:
@@ -185,22 +187,43 @@ def reported_or_right(mutant: Mutant, truth: Truth, result: ReadResult) -> str:
     return "another log"
 
 
-def check_hits(truth: Truth, rows: dict[str, list[Row]], data: bytes, fault: strict_log.FaultError) -> None:
-    """Check that only those messages of a faulty file differ that no CRC protects and whose bytes were hit."""
+def check_hits(
+    truth: Truth,
+    rows: dict[str, list[Row]],
+    data: bytes,
+    fault: strict_log.FaultError,
+    records: bytes | None = None,
+) -> None:
+    """Check that only those messages of a faulty file differ that no CRC protects and whose bytes were hit.
+
+    Args:
+        truth: What is in the intact log.
+        rows: What was read.
+        data: The file, decompressed.
+        fault: Why the twin refuses it.
+        records: The records of all its chunks without compression, where no CRC of the log protects them any more.
+    """
+    protected = truth.log.protected and records is None
+    data += records or b""
     for topic, intact in truth.rows.items():
         missing = Counter(intact) - Counter(rows.get(topic, ()))
         gone = [message for message, row in zip(in_order(truth.log, topic), intact, strict=True) if row in missing]
-        not_hit = [message for message in gone if truth.log.protected or message.record in data]
+        not_hit = [message for message in gone if protected or message.record in data]
         if not_hit or len(rows.get(topic, ())) < len(intact):
             raise ForbiddenError(f"{len(gone)} messages of {topic} are lost or changed; {fault}")
 
 
 def check_counts(mutant: Mutant, truth: Truth, view: Any) -> None:
-    """Check that the overview counts as many messages as the log holds where no damage is reported."""
+    """Check that the overview counts as many messages, and states the times, that the log holds without damage."""
     if isinstance(view, NavirlError) or view.damage or view.contents[0].damage:
         return
-    found = {topic: view.contents[0].topic_count(topic) for topic in WANTS}
-    if found == {topic: len(truth.rows.get(topic, ())) for topic in WANTS}:
+    contents = view.contents[0]
+    found = {topic: contents.topic_count(topic) for topic in WANTS}
+    times = truth.contents.start_ns, truth.contents.end_ns
+    if found == {topic: len(truth.rows.get(topic, ())) for topic in WANTS} and times == (
+        contents.start_ns,
+        contents.end_ns,
+    ):
         return
     try:
         strict = strict_log.walk(strict_log.decompressed(mutant.data))
@@ -209,6 +232,10 @@ def check_counts(mutant: Mutant, truth: Truth, view: Any) -> None:
     right = {topic: len(strict.of(topic)) for topic in WANTS}
     if found != right:
         raise ForbiddenError(f"the overview counts {found}, the strict twin {right}")
+    all_ns = [message.log_time_ns for message in strict.messages]
+    span_ns = (min(all_ns), max(all_ns)) if all_ns else (None, None)
+    if (contents.start_ns, contents.end_ns) != span_ns:
+        raise ForbiddenError(f"the overview says {contents.start_ns} to {contents.end_ns}, the strict twin {span_ns}")
 
 
 def differences(rows: dict[str, list[Row]], right: dict[str, list[Row]]) -> str:

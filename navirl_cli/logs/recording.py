@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,8 @@ class Session(ByContent):
     completion_s: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
+#: Longest time between two measurements of a recording, ns (36 years): differences of times must not overflow.
+_LONGEST_NS: Final = 1 << 60
 #: Fewer forces have no bias that could be told from a push.
 LEAST_FORCES = 50
 
@@ -145,7 +148,7 @@ class Recording:
         """Check shapes and that time runs forward."""
         if len(self.t_ns) < 2:
             raise LogError(f"{self.log}: expected poses of a moving robot, found {len(self.t_ns)}")
-        if not (np.diff(self.t_ns) > 0).all():
+        if not (self.t_ns[1:] > self.t_ns[:-1]).all():
             raise LogError(f"{self.log}: pose times must increase")
         if self.xy_m.shape != (len(self.t_ns), 2) or self.yaw_rad.shape != self.t_ns.shape:
             raise LogError(
@@ -153,6 +156,15 @@ class Recording:
             )
         if self.wrench is not None:
             self._check_wrench(self.wrench.t_ns)
+        for name, t_ns in (
+            ("poses", self.t_ns),
+            ("wrench", self.t_ns[:0] if self.wrench is None else self.wrench.t_ns),
+        ):
+            if len(t_ns) and (span := int(t_ns[-1]) - int(t_ns[0])) > _LONGEST_NS:
+                raise LogError(
+                    f"{self.log}: {name}: expected times of one recording, found {span / 3.156e16:.0f} years between "
+                    "the first and the last; correct the stamps or times of receipt"
+                )
 
     def _check_wrench(self, t_ns: IntArray) -> None:
         """Check that there are enough forces to find a bias, and that they were measured while the robot drove."""

@@ -3,6 +3,7 @@
 import threading
 import zlib
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -15,6 +16,8 @@ from navirl_cli.logs.container.records import HEAD_SIZE, ChunkHead, FoundRecords
 
 #: A chunk that claims more is damaged: recorders write about 1 MB. A wrong number must not fill the memory.
 MAX_CHUNK_BYTES: Final = 1 << 28
+#: Bytes that are decompressed at once where it is not known how many there are.
+_AT_ONCE: Final = 1 << 20
 COMPRESSIONS: Final = frozenset({"", "zstd", "lz4"})
 
 
@@ -39,6 +42,8 @@ class Piece:
     span_ns: tuple[int, int] | None = None
     #: Whether the file ends inside of the chunk.
     cut: bool = False
+    #: Why the chunk is not opened; empty if it may be.
+    refusal: str = ""
     #: Outside of chunks: the bytes, and the records in them.
     unchunked: tuple[bytes, FoundRecords] | None = None
 
@@ -109,7 +114,7 @@ class Decompressor:
             return data
         try:
             if head.compression == "zstd":
-                return self._zstd.decompressobj().decompress(data)
+                return _first_bytes(self._zstd, data, head.size)
             import lz4.frame
 
             return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=head.size))
@@ -128,6 +133,16 @@ class Decompressor:
 
             return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=head.size + 1))
         return data
+
+
+def _first_bytes(zstd: zstandard.ZstdDecompressor, data: Buffer, most: int) -> bytes:
+    """What a cut zstd frame decompresses to, `most` bytes at most."""
+    blocks, left = [], most
+    with suppress(zstandard.ZstdError), zstd.stream_reader(data) as stream:
+        while left and (block := stream.read(min(left, _AT_ONCE))):
+            blocks.append(block)
+            left -= len(block)
+    return b"".join(blocks)
 
 
 def _check(head: ChunkHead) -> None:
@@ -149,6 +164,8 @@ def open_chunk(
         channels: Channels whose message indexes are wanted; None for all.
     """
     indexes = indexes_of(block, piece, channels=channels)
+    if piece.refusal:
+        return OpenedPiece(indexes=indexes, error=piece.refusal)
     content = memoryview(block)[HEAD_SIZE : piece.length]
     try:
         head = records.parse_chunk_head(content)

@@ -15,9 +15,10 @@ from typing import BinaryIO, Final
 import zstandard
 
 from navirl_cli.errors import LogError
+from navirl_cli.limits import REMEDY, Allowance, in_mb
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.raw import RawFile
-from navirl_cli.logs.container.sniff import check_magic, check_path, decompressed_name
+from navirl_cli.logs.container.sniff import check_magic, check_path, check_start, decompressed_name
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 _LZ4: Final = b"\x04\x22\x4d\x18"
@@ -70,14 +71,21 @@ def _is_skipped(head: bytes) -> bool:
 def _decompressed(path: Path, file: BinaryIO, size: int, compression: str) -> RawFile:
     """A temporary file with the bytes that decompress."""
     damage: list[Damage] = []
-    done = 0
+    done, most = 0, Allowance().most(size)
     with ExitStack() as on_failure:
         try:
             target = tempfile.TemporaryFile()  # noqa: SIM115 - the caller closes it
             on_failure.callback(_discard, target)
+            head = b""
             for raw in _Decompression(path, file, size, compression, damage).blocks():
+                if len(head) < _HEAD_BYTES and (head := head + raw[:_HEAD_BYTES]):
+                    check_start(path, head, compression)  # before the disk is filled
                 target.write(raw)
                 done += len(raw)
+                if done > most:
+                    raise LogError(
+                        f"{path}: expected at most {in_mb(most)} in {size} bytes of {compression}, found more; {REMEDY}"
+                    )
             target.seek(0)
         except OSError as error:
             folder = tempfile.tempdir or os.environ.get("TMPDIR", "/tmp")  # noqa: S108 - where Python looks first

@@ -70,7 +70,8 @@ class Opener:
             return None
         base = piece.start + piece.length
         indexes = indexes_of(self._raw.read(base, piece.stop), piece, base)
-        return {number: times for number, (_, times) in indexes.items()} if len(indexes) == len(piece.indexes) else None
+        times = {number: times for number, (_, times) in indexes.items()}
+        return times if len(times) == len(piece.indexes) and _in_span(times, piece.span_ns or (0, 0)) else None
 
     def open(
         self, piece: Piece, channels: tuple[Channel, ...] | None, use: Callable[[Batch], T]
@@ -96,7 +97,7 @@ class Opener:
         for channel in channels:
             offsets = opened.indexes[channel.id][0] if channel.id in opened.indexes else None
             batch = None if offsets is None else self._batch(piece, channel, opened, offsets)
-            if batch is None or offsets is None or len(batch.starts) < len(offsets):
+            if batch is None or not _agrees(batch, opened.indexes[channel.id]):
                 # the message index is missing or wrong: the chunk is walked over instead
                 return opened, None
             batches.append(batch)
@@ -143,6 +144,11 @@ class Opener:
             reason = f"the chunk's message index lists {len(listed)} messages of {channel.topic}, {found} were found"
             self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
             self._damage.lost_messages[channel.id] += len(listed) - found
+        elif index is not None and (wrong := _wrong_times(batch, index)) and not piece.cut:
+            reason = (
+                f"the chunk's message index states other times than {wrong} messages of {channel.topic}; theirs count"
+            )
+            self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
         if batch is not None:
             yield batch
 
@@ -192,3 +198,28 @@ class Opener:
             if number in self._definitions.channels and wanted(channel := self._definitions.channel(number))
         ]
         return f"{opened.error}; messages lost: {', '.join(counts) or 'an unknown number'}"
+
+
+def _in_span(times: dict[int, IntArray], span_ns: tuple[int, int]) -> bool:
+    """Whether the first and the last time of message indexes are those that the chunk states."""
+    ends = [
+        end
+        for some in times.values()
+        if len(some)
+        for end in (some.astype(np.uint64).min(), some.astype(np.uint64).max())
+    ]
+    return not ends or (min(ends), max(ends)) == span_ns
+
+
+def _agrees(batch: Batch, index: tuple[IntArray, IntArray]) -> bool:
+    """Whether a message index names the messages of a batch and their times."""
+    return len(batch.starts) == len(index[0]) and np.array_equal(batch.log_time_ns, index[1])
+
+
+def _wrong_times(batch: Batch | None, index: tuple[IntArray, IntArray]) -> int:
+    """Number of messages of which an index states another time."""
+    if batch is None:
+        return 0
+    places = batch.starts - records.MESSAGE_HEAD_SIZE
+    rows = np.searchsorted(places, index[0]).clip(max=len(places) - 1)
+    return int(((places[rows] == index[0]) & (batch.log_time_ns[rows] != index[1])).sum())

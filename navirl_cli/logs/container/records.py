@@ -4,6 +4,7 @@ Source: the MCAP file format specification, https://mcap.dev/spec. Of each recor
 """
 
 import struct
+from array import array
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -242,12 +243,10 @@ def parse_message_index(content: bytes) -> tuple[int, IntArray, IntArray]:
     times, offsets = np.frombuffer(cursor.blob(), dtype="<i8").reshape(-1, 2).T
     if cursor.at < len(content):
         raise ValueError("a message index is longer than its entries")
-    steps = np.diff(offsets)
-    if (steps < 0).any():
+    if (offsets[1:] < offsets[:-1]).any():
         order = np.argsort(offsets, kind="stable")
         times, offsets = times[order], offsets[order]
-        steps = np.diff(offsets)
-    if not steps.all():
+    if (offsets[1:] == offsets[:-1]).any():
         raise ValueError("a message index names a message twice")
     return channel, offsets, times
 
@@ -257,7 +256,7 @@ class FoundRecords:
     """The records that a walk over a buffer found."""
 
     #: Offsets of the message records, by channel id, ascending.
-    messages: dict[int, list[int]]
+    messages: "dict[int, array[int]]"
     #: Of each schema and channel record: its code, first byte of its contents, first byte after them.
     definitions: list[tuple[int, int, int]]
     #: Where the walk stopped: at the end of the buffer, at a record that is cut, or at one of another type.
@@ -275,7 +274,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
     Returns:
         The records; `stop` is smaller than `limit` if a record is cut or of another type.
     """
-    messages: dict[int, list[int]] = {}
+    messages: dict[int, array[int]] = {}
     definitions: list[tuple[int, int, int]] = []
     unpack = _MESSAGE_START.unpack_from
     last = limit - HEAD_SIZE
@@ -288,7 +287,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
             if channel in messages:
                 messages[channel].append(at)
             else:
-                messages[channel] = [at]
+                messages[channel] = array("q", (at,))
         else:
             length = RECORD_HEAD.unpack_from(data, at)[1]
             if not (code in {SCHEMA, CHANNEL} or code >= PRIVATE) or at + HEAD_SIZE + length > limit:

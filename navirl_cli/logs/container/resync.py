@@ -1,5 +1,6 @@
 """Where records start again after damage, found by what a chunk or a message record must look like."""
 
+from array import array
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from typing import Final
@@ -98,7 +99,7 @@ def walk_over_gaps(data: bytes | memoryview, channels: AbstractSet[int]) -> tupl
             break
         more = records.walk(data, size, again)
         for channel, offsets in more.messages.items():
-            found.messages.setdefault(channel, []).extend(offsets)
+            found.messages.setdefault(channel, array("q")).extend(offsets)
         found = FoundRecords(found.messages, [*found.definitions, *more.definitions], more.stop)
     return found, gaps
 

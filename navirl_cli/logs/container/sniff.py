@@ -66,6 +66,16 @@ def check_magic(path: Path, head: bytes, size: int, inside: str = "") -> None:
     raise LogError(f"{path}: expected an MCAP file{where}, found {_describe(path, head, inside)}")
 
 
+def check_start(path: Path, head: bytes, inside: str) -> None:
+    """Refuse the first bytes that a compressed file decompresses to, as soon as they cannot be MCAP's.
+
+    Raises:
+        LogError: As :func:`check_magic`.
+    """
+    if head[: len(MAGIC)] != MAGIC[: len(head)]:
+        check_magic(path, head, len(head), inside)
+
+
 def decompressed_name(path: Path) -> Path:
     """A name for the decompressed file, in the same folder."""
     compressed = path.suffix in {".zstd", ".zst", ".lz4"}

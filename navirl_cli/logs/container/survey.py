@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
+from navirl_cli.limits import REMEDY, Allowance, in_mb
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Definitions
 from navirl_cli.logs.container.chunks import COMPRESSIONS, MAX_CHUNK_BYTES, Piece
@@ -74,6 +75,7 @@ class Survey:
         #: Bytes to read at once outside of chunks: few after damage, because more damage may follow.
         self._block = BLOCK
         #: Whether chunks are compressed. If so, bytes outside of chunks that look like a message are not one.
+        self._allowance = Allowance()
         self._compressed = any(chunk.compression for chunk in chunks.values())
 
     def pieces(self) -> Iterator[Piece | None]:
@@ -97,7 +99,7 @@ class Survey:
                 following = self._resume(at, broken)
             if piece is not None:
                 self._damage.met(piece.span_ns)
-                yield replace(piece, number=count)
+                yield replace(piece, number=count, refusal=self._refusal(piece))
                 count += 1
             at = following
         if at is not None:
@@ -114,6 +116,23 @@ class Survey:
                 f"the CRC of the data section is {crc:#010x}, expected {expected:#010x}: some bytes have "
                 "changed, so values that look valid may be wrong",
             )
+
+    def _refusal(self, piece: Piece) -> str:
+        """Why a chunk is not opened: what it claims is more than the file may unpack to; "" if it may be."""
+        if piece.unchunked is not None:
+            return ""
+        try:
+            head = self._chunk_head(piece.start, self._raw.size)
+        except records.MALFORMED:
+            return ""  # which opening it reports
+        packed = piece.length
+        most = self._allowance.most(packed)
+        if head.compression == "" or head.size > MAX_CHUNK_BYTES or self._allowance.take(packed, head.size):
+            return ""
+        return (
+            f"the chunk claims {in_mb(head.size)} uncompressed, expected at most {in_mb(most)} of {packed} bytes; "
+            f"{REMEDY}"
+        )
 
     def _next_indexed(self, at: int) -> int | None:
         """Where the next chunk that the summary names starts."""

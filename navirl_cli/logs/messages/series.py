@@ -114,7 +114,7 @@ class SeriesBuilder:
         """The order by time, then by file, then in the file; None if the batches are already in this order."""
         if len(self.decoders) > 1:
             return np.lexsort((order, times))
-        return np.argsort(times, kind="stable") if (np.diff(times) < 0).any() else None
+        return np.argsort(times, kind="stable") if (times[1:] < times[:-1]).any() else None
 
 
 def _joined(arrays: Sequence[IntArray]) -> IntArray:

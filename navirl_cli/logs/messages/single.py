@@ -12,11 +12,13 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.arrays import IntArray
+from navirl_cli.limits import RATIO, Allowance
 from navirl_cli.logs.container.batches import Batch, gathered
 
 _MAGIC: Final = 0xFD2FB528
 #: Most bytes that the messages of a batch may take, and that a single one may take.
 _MOST_BYTES: Final = 1 << 28
+_UNSTATED_BYTES: Final = 1 << 20
 
 
 def without_compression(batch: Batch) -> Batch:
@@ -32,12 +34,19 @@ def _decompressed(batch: Batch, rows: IntArray) -> Batch:
     from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
     decompressor, left = ZstdDecompressor(), _MOST_BYTES
+    allowance = Allowance()
     parts = [batch.payload(row) for row in range(len(batch.starts))]
     for row in rows.tolist():
         try:
             size = frame_content_size(parts[row])
-            if size <= left:
-                parts[row] = decompressor.decompress(parts[row], max_output_size=left)
+            packed = len(parts[row])
+            # a frame need not state its size
+            most = size if size >= 0 else min(left, max(_UNSTATED_BYTES, RATIO * packed))
+            if most > left or (size > 0 and not allowance.take(packed, size)):
+                continue
+            unpacked = decompressor.decompress(parts[row], max_output_size=most)
+            if size >= 0 or allowance.take(packed, len(unpacked)):
+                parts[row] = unpacked
                 left -= len(parts[row])
         except (ZstdError, MemoryError):
             continue

@@ -170,7 +170,7 @@ class Curve:
         if not rows.size:
             return None, found
         rows = rows[np.argsort(t_ns[rows], kind="stable")]
-        rows = rows[np.append(np.diff(t_ns[rows]) > 0, True)]
+        rows = rows[np.append(t_ns[rows[1:]] > t_ns[rows[:-1]], True)]
         return cls(parent, child, t_ns[rows], translation[rows], normalised(quaternion[rows]), fixed), found
 
     @property
