@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
     write_json(folder / "demos.json", "demonstrations", demonstrations_document(shown, [], {}), force=False)
     for term in EVERY:
         last = TERMS[term].parameters[-1].name if term in TERMS else "s_y"
-        asked = ["--terms", words_of(term), "--profile", last, "--cross-validate", "participant"]
+        asked = ["--terms", words_of(term), "--intervals", "wald", "--profile", last, "--cross-validate", "participant"]
         words = ["fit", str(folder / "demos.json"), *asked, "-o", str(folder / f"{term}.json")]
         result = CliRunner().invoke(cli, words, catch_exceptions=False)
         assert result.exit_code in {0, 3}, result.output

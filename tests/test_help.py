@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
     files = forge.participant()
     (folder / "runs.tar.gz").write_bytes(forge.archive({f"runs/p1/{name}": data for name, data in files.items()}))
     (folder / "trials.csv").write_text(CliRunner().invoke(cli, ["inspect", str(SAMPLES[0]), "--trials"]).stdout)
-    fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2"]
+    fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2", "--intervals", "wald"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for words in (
@@ -114,7 +114,7 @@ TABLES = {
     "inspect": ["p01.mcap"],
     "annotate": ["p01.mcap", "trials.csv", "-o", "new.mcap"],
     "extract": ["p01.mcap", "-o", "new.json"],
-    "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
+    "fit": ["demos.json", "--cycle", "2", "--intervals", "wald", "-o", "new.json"],
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],

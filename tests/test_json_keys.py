@@ -30,6 +30,8 @@ WITHOUT = {
         "trial",
         "labelled",
         "messages",
+        "steps_all",
+        "steps_reachable",
         "gaps",
         "cells",
     ),

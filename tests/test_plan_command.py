@@ -31,7 +31,7 @@ def run(*words, code=0):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plan")
     run("extract", LOG, "-o", folder / "demos.json")
-    run("fit", folder / "demos.json", "--cycle", 2, "-o", folder / "reward.json")
+    run("fit", folder / "demos.json", "--cycle", 2, "--intervals", "wald", "-o", folder / "reward.json")
     return folder
 
 

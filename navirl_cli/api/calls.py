@@ -41,7 +41,7 @@ from navirl_cli.evaluation.drawn import MOST, Precision
 from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Questions, answers
@@ -375,7 +375,8 @@ def evaluate(
         metrics: Names of metrics, or "all"; the paper's three by default.
         by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
-        ranks: Rank each demonstration by likelihood among paths sampled from the policy.
+        ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
+            group, for the groups that the reward was learnt from.
         samples: Number of paths sampled from each policy in each scene.
         precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
             deviation.
@@ -402,11 +403,17 @@ def evaluate(
     )
     asked = pairs_in(pair)
     groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
+    one = next(iter(rewards.values()), None)
+    trained = one.trained(demos) if ranks and isinstance(one, LearntReward) else None
+    if ranks:
+        check_to_rank(demos, trained)
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
     result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
     compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in asked]
-    ranked = ranks_of(demos, next(iter(learnt.values())), drawing.samples, rng) if ranks else []
+    ranked = Ranking()
+    if ranks:
+        ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
     inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
     document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
     _warn(result.notes)

@@ -20,7 +20,7 @@ from navirl_cli.artefacts.analyses import (
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
-from navirl_cli.evaluation.groups import by_evidence_group
+from navirl_cli.evaluation.groups import Trained, by_evidence_group
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
@@ -63,10 +63,23 @@ class LearntReward(ByContent):
     profiles: tuple[Profile, ...] = ()
     #: Groups of these demonstrations; None for files from before they were written.
     groups: tuple[str, ...] | None = None
+    participants: tuple[str, ...] = ()
     #: None for files from before it was written.
     search: Search | None = None
     #: Intervals of the parameters, by participant first; none in files from before they were written.
     intervals: tuple[Intervals, ...] = ()
+
+    def trained(self, demonstrations: Sequence[Demonstration]) -> Trained | None:
+        """What it was learnt from; None where neither its file nor the demonstrations say which groups.
+
+        Args:
+            demonstrations: Among them perhaps those from which it was learnt.
+        """
+        ids = frozenset(self.demonstrations)
+        own = [one for one in demonstrations if one.id in ids]
+        groups = frozenset(by_evidence_group(own) if self.groups is None else self.groups)
+        people = frozenset(self.participants) or frozenset(one.participant for one in own)
+        return Trained(ids, people, groups) if groups else None
 
     def as_prior(self) -> Prior:
         """The prior that this fit gives to the next one.
@@ -219,6 +232,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
         groups=tuple(document["groups"]) if "groups" in document else None,
+        participants=tuple(document["participants"]),
         status=Status(document["status"]),
         profiles=profiles,
         intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),

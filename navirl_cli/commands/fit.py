@@ -48,9 +48,8 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
         Example(
             "Another reward",
-            "navirl fit demos.json --cycle 2 --terms length,saturating-deviation,personal-space,turn -o reward.json",
+            "navirl fit demos.json --cycle 2 --terms length,deviation,length-space -o reward.json",
         ),
-        Example("A profile likelihood", "navirl fit demos.json --cycle 2 --profile sigma_p -o reward.json"),
     ],
 )
 @demos_argument
@@ -93,8 +92,9 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     click.option(
         "--intervals",
         type=Choice([kind.value for kind in Kind]),
-        help="95 % intervals from profile likelihoods or from standard errors (wald). Default: profile with fewer than "
-        f"{FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else wald.",
+        help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
+        f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
+        "wald; wald with a term of turns, where profiles take minutes.",
     ),
     click.option(
         "--bootstrap",

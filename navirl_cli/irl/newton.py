@@ -6,7 +6,7 @@ followed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ class Effort:
     """When a search ends."""
 
     #: Largest number of steps.
-    most: int = MAX_ITERATIONS
+    most: int = field(default_factory=lambda: MAX_ITERATIONS)
     #: A predicted gain below which it has converged, nats.
     enough: float = GAIN_TOLERANCE
 
@@ -75,7 +75,7 @@ def maximise(
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
     hope: float | None = None,
-    effort: Effort = Effort(),
+    effort: Effort | None = None,
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -88,7 +88,7 @@ def maximise(
         known: Maxima found before. The search ends early where it is converging to one of them.
         hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
             within a coarse tolerance.
-        effort: When the search ends.
+        effort: When the search ends; the default is :class:`Effort`.
 
     Returns:
         The maximum and the accepted places before it.
@@ -98,6 +98,7 @@ def maximise(
     if hope is not None:
         radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
+    effort = effort or Effort()
     while len(path) <= effort.most and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
             break
