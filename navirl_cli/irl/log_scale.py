@@ -30,7 +30,8 @@ class LogScale(ByContent):
     @property
     def signs(self) -> FloatArray:
         """(v,) signs of the varying parameters."""
-        return np.sign(np.array(self.reward.theta)[self.varying])
+        signs: FloatArray = np.sign(np.array(self.reward.theta)[self.varying])
+        return signs
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -42,7 +43,8 @@ class LogScale(ByContent):
 
     def of(self, reward: Reward) -> FloatArray:
         """(v,) y of a reward with the same terms and signs."""
-        return np.log(np.abs(np.array(reward.theta)[self.varying]))
+        logs: FloatArray = np.log(np.abs(np.array(reward.theta)[self.varying]))
+        return logs
 
     def values(self, y: FloatArray) -> FloatArray:
         """(..., v) values of the varying parameters at (..., v) y, in their units."""

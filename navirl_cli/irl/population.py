@@ -14,12 +14,12 @@ import numpy as np
 from navirl_cli.arrays import BoolArray, ByContent, FloatArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.fit import Fit, fit
+from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.log_scale import LogScale, Witness
 from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.random_effects import Posterior, RandomEffects, Spread, draw, laplace, random_effects
+from navirl_cli.irl.random_effects import Posterior, RandomEffects, random_effects
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
 
@@ -39,11 +39,13 @@ class Person(ByContent):
     upper: FloatArray
     #: (k, k) in the parameters' units; zero where people do not differ.
     covariance: FloatArray
-    #: Numbers of own demonstrations and steps.
-    demonstrations: int
+    #: Numbers of the own demonstrations, in the order of the evidence, and the number of own steps.
+    owners: tuple[int, ...]
     steps: int
-    #: Log-likelihood of the own steps under the own reward, nats.
+    #: Log-likelihood of the own steps, nats: under the own reward, the typical one, and equally likely moves.
     log_likelihood: float
+    log_likelihood_typical: float
+    log_likelihood_uniform: float
     #: Effective number of the nodes of importance sampling, and their number.
     effective: float
     drawn: int
@@ -118,13 +120,13 @@ def population(
     people = [Witness(name, _of(evidence, name), scale, share) for name in names]
     found = random_effects(people, scale.of(pooled.reward), executor=executor, progress=progress)
     known = found.mixture
+    mean, covariance = known.typical()
     persons = [
-        _person(one, mean, covariance, posterior)
-        for one, mean, covariance, posterior in zip(
+        person_of(one, own, total, posterior, scale.at(mean))
+        for one, own, total, posterior in zip(
             people, known.person_mean, known.person_covariance, found.people, strict=True
         )
     ]
-    mean, covariance = known.typical()
     numbers = range(len(mean))
     quantiles = np.array([[known.scatter_quantile(j, share) for j in numbers] for share in (_TAIL, 0.5, 1 - _TAIL)])
     lower, upper = np.array([known.interval(j, LEVEL) for j in numbers]).T
@@ -146,70 +148,21 @@ def population(
     return _typical(evidence, pooled, found, result), result, _intervals(result)
 
 
-@dataclass(frozen=True, eq=False)
-class Others(ByContent):
-    """What earlier people say about the next one."""
-
-    #: The typical reward, and the parameters in which people differ.
-    scale: LogScale
-    #: Mean of the logarithms, and standard deviation of the next person's: the scatter and the mean's error together.
-    spread: Spread
-
-
-def newcomer(evidence: Evidence, others: Others, name: str) -> tuple[Fit, Intervals]:
-    """The reward of a new person by this person's demonstrations and by the scatter between earlier people.
-
-    Args:
-        evidence: Demonstrations of this person alone.
-        others: Earlier people.
-        name: Of the person.
-
-    Returns:
-        The fit, whose errors are those of the person, and its intervals.
-
-    Raises:
-        InfinitePartitionError: The typical reward has no policy in a scene of the person.
-    """
-    scale = others.scale
-    nothing = Prior.l2(scale.reward.parameters, 0.0)
-    one = Witness(name, evidence, scale, nothing)
-    everything = [parameter.name for parameter in scale.reward.parameters]
-    held = fit(evidence, scale.reward, 0.0, fixed=everything, scan=False)
-    around = laplace(one, others.spread, others.spread.mean)
-    known = draw(one, around, others.spread).under(others.spread)
-    person = _person(one, known.mean, known.covariance, known)
-    covariance = np.full_like(held.covariance, np.nan)
-    own = np.ix_(scale.varying, scale.varying)
-    covariance[own] = person.covariance[own]
-    found = replace(
-        held,
-        reward=person.reward,
-        covariance=covariance,
-        clustered=None,
-        status=Status.CONVERGED,
-        identified=scale.varying,
-        on_bound=np.zeros_like(scale.varying),
-        log_likelihood=person.log_likelihood,
-        objective=known.evidence,
-        path_theta=np.array([scale.reward.theta, person.reward.theta]),
-        path_log_likelihood=np.array([held.log_likelihood, person.log_likelihood]),
-    )
-    ends = tuple(
-        Ends(parameter, float(low), float(high))
-        for parameter, low, high in zip(
-            scale.names, person.lower[scale.varying], person.upper[scale.varying], strict=True
-        )
-    )
-    return found, Intervals(Kind.POSTERIOR, Errors.MODEL, LEVEL, ends)
-
-
 def _of(evidence: Evidence, name: str) -> Evidence:
     """The steps of one participant."""
     return evidence.repeated(np.array([one == name for one in evidence.participants], dtype=int))
 
 
-def _person(one: Witness, mean: FloatArray, total: FloatArray, known: Posterior) -> Person:
-    """A person by the posterior of the logarithms."""
+def person_of(one: Witness, mean: FloatArray, total: FloatArray, known: Posterior, typical: Reward) -> Person:
+    """A person by the posterior of the logarithms.
+
+    Args:
+        one: The person's demonstrations.
+        mean: (v,) of the logarithms.
+        total: (v, v) their covariance.
+        known: The posterior under one spread, which says how well it was sampled.
+        typical: The typical reward.
+    """
     reward = one.scale.at(mean)
     theta, varying = np.array(reward.theta), one.scale.varying
     errors = np.sqrt(np.diag(total))
@@ -223,9 +176,11 @@ def _person(one: Witness, mean: FloatArray, total: FloatArray, known: Posterior)
         lower=lower,
         upper=upper,
         covariance=covariance,
-        demonstrations=len(one.evidence.owners),
+        owners=tuple(one.evidence.owners.tolist()),
         steps=one.evidence.steps,
         log_likelihood=log_likelihood(one.evidence, reward),
+        log_likelihood_typical=log_likelihood(one.evidence, typical),
+        log_likelihood_uniform=one.evidence.uniform_log_likelihood(),
         effective=known.effective,
         drawn=known.drawn,
     )

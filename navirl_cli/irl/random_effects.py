@@ -25,13 +25,16 @@ from navirl_cli.parallel import map_in_order
 WIDTH = 0.5
 #: Bounds of a scatter, and where the search starts. A scatter at the lower one counts as zero.
 LEAST, MOST, FIRST = 0.01, 3.0, 0.2
-#: Nodes of each person: pairs on either side of the mode. Degrees of freedom of their distribution, whose tails are
-#: heavier than those of any posterior under a normal scatter.
-PAIRS, FREEDOM = 24, 6.0
+#: Nodes: pairs on either side of a person's mode, of all people together, and the least and largest number of a person.
+#: Degrees of freedom of their distribution, whose tails are heavier than those of any posterior under a normal scatter.
+PAIRS, FEWEST_PAIRS, MOST_PAIRS, FREEDOM = 600, 24, 128, 6.0
 #: Largest numbers of rounds with modes, of draws of nodes, and of rounds with the same nodes.
-MODE_ROUNDS, DRAWS, NODE_ROUNDS = 6, 4, 12
-#: A round moves the spread by less than so many standard errors at the end of the modes, and of the nodes.
-SMALL, SMALLEST = 0.2, 0.01
+MODE_ROUNDS, DRAWS, NODE_ROUNDS = 8, 5, 12
+#: Largest move of a round: of the mean in scatters, of the logarithm of a scatter. Farther away the Gaussian stand-ins
+#: say nothing about the likelihoods.
+REACH = 1.0, 0.7
+#: A round moves the spread by less than so many standard errors at the end of the modes, and with the same nodes.
+SMALL, SMALLEST = 0.2, 0.02
 #: Nodes are drawn again where, for a person, fewer than this share of them count.
 WORN = 0.25
 #: Even numbers keep away from 0 and 1 by this.
@@ -125,10 +128,10 @@ class Factors:
         """(n, v) posterior means, (n, v, v) covariances, and (n,) log integrals."""
         precision = 1.0 / spread.scatter**2
         both = self.a + np.diag(precision)
-        covariance = np.linalg.inv(both)
+        covariance = np.asarray(np.linalg.inv(both), dtype=float)
         pull = self.b + precision * spread.mean
-        mean = np.einsum("nij,nj->ni", covariance, pull)
-        logs = 0.5 * (mean * pull).sum(axis=1) - 0.5 * float(precision @ spread.mean**2)
+        mean: FloatArray = np.einsum("nij,nj->ni", covariance, pull)
+        logs: FloatArray = 0.5 * (mean * pull).sum(axis=1) - 0.5 * float(precision @ spread.mean**2)
         logs = logs - 0.5 * np.linalg.slogdet(both)[1] - np.log(spread.scatter).sum()
         return mean, covariance, logs
 
@@ -316,17 +319,22 @@ class _Search:
 
     def by_nodes(self) -> None:
         """Rounds with importance sampling."""
+        pairs = min(max(PAIRS // len(self.people), FEWEST_PAIRS), MOST_PAIRS)
+        around, self.around = self._laplace(), self.spread
         for _ in range(DRAWS):
-            around = self._laplace()
-            jobs = [(*one, self.spread, k) for k, one in enumerate(zip(self.people, around, strict=True))]
+            jobs = [(*one, self.around, pairs, k) for k, one in enumerate(zip(self.people, around, strict=True))]
             nodes = list(map_in_order(_drawn, jobs, self.executor))
+            first = 0.0
             for _ in range(NODE_ROUNDS):
-                moved = self._round([one.under(self.spread) for one in nodes])
-                fresh = min(one.effective for one in self.posteriors) > WORN * 2 * PAIRS
+                under = self.spread
+                moved = self._round([one.under(under) for one in nodes])
+                first = first or moved
+                fresh = min(one.effective for one in self.posteriors) > WORN * 2 * pairs
                 if moved < SMALLEST or not fresh:
                     break
-            self.converged = moved < SMALL
-            if self.converged and fresh:
+            self.converged = fresh and max(first, moved) < SMALL
+            around, self.around = (self.posteriors, under) if fresh else (self._laplace(), self.spread)
+            if self.converged:
                 break
 
     def _round(self, posteriors: Sequence[Posterior]) -> float:
@@ -334,8 +342,9 @@ class _Search:
         self.posteriors = list(posteriors)
         self.factors = Factors.of(posteriors, self.spread)
         objective = Restricted(self.factors, self.width)
-        top = best_spread(objective, self.spread)
-        errors = np.sqrt(1.0 / np.maximum(-np.diag(top.hessian), 1.0))
+        top = best_spread(objective, self.spread, reach=REACH)
+        values, basis = np.linalg.eigh(-top.hessian)
+        errors = np.sqrt((basis**2 / np.maximum(values, FLATTEST)).sum(axis=1))
         moved = float(np.abs((top.x - self.spread.x) / errors).max())
         self.spread = Spread.at(top.x)
         self.places.append((self.spread.mean, sum(one.evidence for one in posteriors)))
@@ -492,21 +501,22 @@ def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
     return Posterior(best.x, covariance, best.value + area, np.nan, 0)
 
 
-def _drawn(job: tuple[Likely, Posterior, Spread, int]) -> Nodes:
+def _drawn(job: tuple[Likely, Posterior, Spread, int, int]) -> Nodes:
     """Nodes around a mode; importable by name, to run in another process."""
     return draw(*job)
 
 
-def draw(person: Likely, around: Posterior, spread: Spread, number: int = 0) -> Nodes:
-    """Nodes around a mode, with the person's log-likelihood.
+def draw(person: Likely, around: Posterior, spread: Spread, pairs: int = MOST_PAIRS, number: int = 0) -> Nodes:
+    """Nodes around a posterior, with the person's log-likelihood.
 
     Args:
         person: The log-likelihood.
-        around: Laplace's approximation under a spread.
+        around: An approximation of the posterior under a spread.
         spread: That spread.
+        pairs: Of nodes.
         number: Of the person, so that errors of several people are independent.
     """
-    y, density = scattered(around, PAIRS, number)
+    y, density = scattered(around, pairs, number)
     return Nodes(y, np.array([person.value(one) for one in y]), density, Factors.of([around], spread))
 
 
@@ -539,14 +549,25 @@ def scattered(around: Posterior, pairs: int, number: int) -> tuple[FloatArray, F
     return around.mean + unit @ root.T, density
 
 
-def best_spread(objective: Restricted, start: Spread, fixed: int | None = None) -> Point:
-    """The maximum of the restricted likelihood; a variable by number may be held."""
+def best_spread(
+    objective: Restricted, start: Spread, fixed: int | None = None, reach: tuple[float, float] | None = None
+) -> Point:
+    """The maximum of the restricted likelihood.
+
+    Args:
+        objective: The restricted likelihood.
+        start: Where the search starts.
+        fixed: A variable that is held, by number.
+        reach: How far the mean may move, in scatters, and the logarithm of a scatter; anywhere by default.
+    """
     free = np.ones(len(start.x), dtype=bool)
     if fixed is not None:
         free[fixed] = False
-    return maximise(objective, objective(start.x), _bounds(len(start.mean)), free).best
-
-
-def _bounds(v: int) -> tuple[FloatArray, FloatArray]:
-    wide = np.full(v, np.inf)
-    return np.concatenate([-wide, np.full(v, np.log(LEAST))]), np.concatenate([wide, np.full(v, np.log(MOST))])
+    v = len(start.mean)
+    wide = np.full(2 * v, np.inf)
+    if reach is not None:
+        wide = np.concatenate([reach[0] * start.scatter, np.full(v, reach[1])])
+    ends = np.full(v, np.inf)
+    low = np.maximum(start.x - wide, np.concatenate([-ends, np.full(v, np.log(LEAST))]))
+    high = np.minimum(start.x + wide, np.concatenate([ends, np.full(v, np.log(MOST))]))
+    return maximise(objective, objective(start.x), (low, high), free).best
