@@ -34,7 +34,7 @@ from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
-from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
+from navirl_cli.figures.style import COLUMN_IN, FONTS, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ class PageOptions(TypedDict, total=False):
     wide: bool
     #: "paper", "screen" (twice the pixels) or "dark".
     style: str
+    #: "sans", or "times" for letters like those of an IEEE paper.
+    font: str
     #: File to write: .png, .pdf or .svg, with embedded fonts. The figure is then not shown.
     output: PathLike | None
     #: Replace an existing file.
@@ -189,15 +191,17 @@ def properties(
     *,
     samples: int = 100,
     seed: int = 0,
+    bars: bool = False,
     **page: Unpack[PageOptions],
 ) -> "list[Axes]":
-    """Draw length, distance and area of paths by condition, as bars (the paper's Fig. 7).
+    """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
         demos: Demonstrations, or their file.
-        reward: Adds bars of the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
+        bars: Bars from 0 with standard deviations, in place of points.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -210,10 +214,11 @@ def properties(
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
-    bars = bars_of(result.groups, _taught(reward, demonstrations))
-    panels = len(PAPER_METRICS)
-    height_in = height_for(bars, _width_in(page))
-    return _drawn(lambda axes: draw_properties(axes, bars), None, page, panels=panels, height_in=height_in)
+    rows = bars_of(result.groups, _taught(reward, demonstrations))
+    panels, height_in = len(PAPER_METRICS), height_for(rows, _width_in(page))
+    return _drawn(
+        lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, panels=panels, height_in=height_in
+    )
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
@@ -350,11 +355,12 @@ def _drawn(
 ) -> "list[Axes]":
     """Draw on given axes, or on a new figure that is shown or written."""
     output, style = page.get("output"), one_of(tuple(LOOKS), page.get("style", "paper"), "style")
+    font = one_of(tuple(FONTS), page.get("font", "sans"), "font")
     if axes is not None and output is not None:
         raise ArgumentError("`output` is for new figures: save the figure of your `axes` yourself")
     if output is not None:
         check_target(Path(output), force=page.get("force", False))
-    with styled(style):
+    with styled(style, font):
         if axes is not None:
             draw(axes)
             return axes
