@@ -246,5 +246,26 @@ def test_properties_can_be_bars_and_letters_those_of_ieee(files, figure_of):
     assert figure.axes[0].xaxis.label.get_fontname() == "STIXGeneral"
 
 
+def test_more_than_forty_paths_have_a_map_for_each_group(figure_of):
+    ones = [
+        replace(demonstration(condition, cycle, 0.02 * n), id=f"p01/{condition}{cycle}{n}")
+        for condition, cycle in ((Condition.FORCE, 1), (Condition.FORCE, 2), (Condition.JOYSTICK, None))
+        for n in range(14)
+    ]
+    write_json(Path("many.json"), "demonstrations", demonstrations_document(ones, [], {}), force=False)
+    figure = figure_of("paths", "many.json")
+    assert [panel.get_title().replace("\N{NO-BREAK SPACE}", " ").replace("\n", " ") for panel in figure.axes[:3]] == [
+        "force, cycle 1 (n = 14)",
+        "force, cycle 2 (n = 14)",
+        "joystick (n = 14)",
+    ]
+    assert not [text for text in entries(figure) if "force" in text], "titles name the groups"
+    (alone,) = figure_of("paths", "many.json", "--together").axes
+    paths = [line for line in alone.lines if len(line.get_xdata()) > 50]
+    assert len(paths) == 42
+    assert max(line.get_linewidth() for line in paths) < 0.5
+    assert "force, cycle 1 (n = 14)" in entries(alone.figure)
+
+
 def test_fonts_are_those_of_the_styles():
     assert list(FONTS) == list(style.FONTS)

@@ -26,6 +26,7 @@ from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
 from navirl_cli.figures.overlay import alike, overlays_of
@@ -63,6 +64,7 @@ def paths(
     *,
     axes: "Axes | None" = None,
     crop: bool = False,
+    together: bool = False,
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
@@ -71,15 +73,20 @@ def paths(
         demos: Demonstrations, or their file.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the paths.
+        together: One map for all groups, also with more than 40 paths and without `axes`.
         **page: As in :class:`PageOptions`.
 
     Returns:
-        The axes.
+        The axes; those of the first group where each has its own.
 
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
+    groups = [] if together or axes is not None else panels_of(demonstrations)
+    if groups:
+        shape = {"panels": len(groups), "columns": 2}
+        return _drawn(lambda panels: draw_path_panels(panels, groups, crop=crop), None, page, **shape)[0]
     return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
 
 

@@ -33,16 +33,25 @@ if TYPE_CHECKING:
 )
 @page_options
 @demos_argument
-@section("Scene", crop_option)
-def paths(page: Page, demos: Path, crop: bool) -> None:
+@section(
+    "Scene",
+    crop_option,
+    click.option("--together", is_flag=True, help="One map for all groups, also with more than 40 paths."),
+)
+def paths(page: Page, demos: Path, crop: bool, together: bool) -> None:
     """Draw all driven paths over the map, by condition.
 
-    As in Fig. 3 of the paper. Stretches in contact are thicker.
+    As in Fig. 3 of the paper. Stretches in contact are thicker. More than 40 paths have a map for each group.
     """
+    from navirl_cli.figures.conditions import draw_path_panels, panels_of
     from navirl_cli.figures.paths import draw_paths
 
     demonstrations = demonstrations_in(demos)
-    page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
+    panels = [] if together else panels_of(demonstrations)
+    if panels:
+        page.draw(lambda axes: draw_path_panels(axes, panels, crop=crop), panels=len(panels), columns=2)
+    else:
+        page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
 
 
 @click.command(
