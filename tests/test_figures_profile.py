@@ -328,7 +328,7 @@ def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(
     assert [one.name for one in chosen_profiles(common(), [name])] == [name]
     assert [one.name for one in chosen_profiles(common(), [])] == [one.name for one in common()]
     with pytest.raises(
-        ArtefactError, match="`parameter`: expected 'c0', found 'mass'; fit again with `profile` for others"
+        ArtefactError, match="`parameter`: expected 'sigma_p', found 'mass'; fit again with `profile` for others"
     ):
         chosen_profiles(common()[:1], ["mass"])
     assert plot(common()[:2]).exit_code == 0
