@@ -120,7 +120,8 @@ def test_keywords_are_the_options_with_their_defaults(function, path):
     }
     options = options_of(*path)
     beyond = {"executor", "axes", "page", "demos", "demonstration", "reward", "name"}
-    of_the_shell = {"wide", "style", "trial", "group", "reward"}
+    # `name` of plot.profile is one --parameter
+    of_the_shell = {"parameter", "wide", "style", "font", "trial", "group", "reward"}
     # the table of trials is a file to fill in
     table = {"trials", "split", "goal", "frame"} if path == ("inspect",) else set()
     missing = set(options) - set(keywords) - of_the_shell - table

@@ -10,7 +10,7 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, refuse_unused, seed_option
 from navirl_cli.commands.types import Choice, Count
 from navirl_cli.commands.usage import Command, Example, Function, section
 
@@ -92,6 +92,8 @@ def scene_options(function: Function) -> Function:
 
     @wraps(function)
     def packed(page: Page, demos: Path, reward: Path, trial: str | None, **others: Any) -> Any:
+        if SAMPLES not in others["overlay"]:
+            refuse_unused("--overlay samples", "samples", "seed")
         demonstrations = demonstrations_in(demos)
         learnt = read_reward_for(reward, demonstrations).reward
         return function(page, Sight(demonstrations, trial_of(demonstrations, trial), learnt, **others))
