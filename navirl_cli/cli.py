@@ -26,6 +26,7 @@ COMMANDS = {
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",
+    "watch": "Learn from the recordings of a folder as they are finished, and plan the next paths.",
     "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",
