@@ -3,12 +3,14 @@
 import json
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import published_factory as forge
 import pytest
 from click.testing import CliRunner
 from command_line import commands, options
+from rerun_fake import fake_rerun
 
 from navirl_cli.cli import cli
 from navirl_cli.commands.usage import Command
@@ -120,6 +122,7 @@ TABLES = {
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],
+    "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
     "simulate": ["--participants", "1", "-o", "new"],
     "study": ["demos.json", "--samples", "20", "-o", "new"],
@@ -173,6 +176,7 @@ def keys_in(document, by_data=False):
 @pytest.mark.parametrize("line", [marked(line) for words, _ in commands() for line in examples_in(help_of(*words))])
 def test_examples_run(folder, tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "rerun", fake_rerun())
     words = shlex.split(line)[1:]
     if words[0] == "watch" and "--once" not in words:
         words.append("--once")  # it would wait for more

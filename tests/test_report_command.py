@@ -66,6 +66,16 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
 
 
+def test_it_warns_of_starts_aside(work):
+    content = json.loads((work / "reward.json").read_text())
+    content.update(demonstrations=["p01/1", "p01/2"], groups=["force, cycle 1"])
+    first, report = work / "first.json", work / "first.html"
+    first.write_text(json.dumps(content))
+    words = ["report", work / "demos.json", first, "-o", report, "--samples", 10]
+    assert CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False).exit_code == 0
+    assert "<li>All 2 demonstrations are of cycle 1 and start 0." in report.read_text()
+
+
 def test_it_warns_of_uncertain_parameters(page):
     assert "<li>Open interval: converged, but the demonstrations set no end to a parameter on one side" in page
     assert "Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %." in page
