@@ -52,6 +52,23 @@ def trials(ctx: click.Context, _incomplete: str) -> Iterator[str]:
     return (one.id for one in read_demonstrations(_files(ctx, "demos")[0]))
 
 
+def _names(field: str) -> Complete:
+    """Names of a field of the demonstrations in the file on the command line."""
+
+    @_proposed
+    def names(ctx: click.Context, _incomplete: str) -> Iterable[str]:
+        from navirl_cli.artefacts.demonstrations import read_demonstrations
+        from navirl_cli.demos.subset import FIELDS
+
+        found = [FIELDS[field](one) for one in read_demonstrations(_files(ctx, "demos")[0])]
+        return sorted({name.removeprefix("cycle ") for name in found if name != "no cycle"})
+
+    return names
+
+
+cycles, sets, participants = _names("cycle"), _names("set"), _names("participant")
+
+
 @_proposed
 def groups(ctx: click.Context, _incomplete: str) -> Iterable[str]:
     """Groups of the demonstrations in the file on the command line, by the fields on it."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, trial_of, trial_option
 from navirl_cli.commands.shared import (
     demonstrations_in,
@@ -16,7 +17,7 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, refuse_unused, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
@@ -32,15 +33,16 @@ if TYPE_CHECKING:
 )
 @page_options
 @demos_argument
+@choice_options(reward=False)
 @section("Scene", crop_option)
-def paths(page: Page, demos: Path, crop: bool) -> None:
+def paths(page: Page, demos: Path, choosing: Choosing, crop: bool) -> None:
     """Draw all driven paths over the map, by condition.
 
     As in Fig. 3 of the paper. Stretches in contact are thicker.
     """
     from navirl_cli.figures.paths import draw_paths
 
-    demonstrations = demonstrations_in(demos)
+    demonstrations = choosing.of(demonstrations_in(demos))
     page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
 
 
@@ -53,6 +55,7 @@ def paths(page: Page, demos: Path, crop: bool) -> None:
 )
 @page_options
 @demos_argument
+@choice_options(reward=True)
 @section(
     "Learnt paths",
     click.option(
@@ -63,7 +66,7 @@ def paths(page: Page, demos: Path, crop: bool) -> None:
     samples_option(100),
     seed_option,
 )
-def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed: int) -> None:
+def properties(page: Page, demos: Path, choosing: Choosing, reward: Path | None, samples: int, seed: int) -> None:
     """Draw length, distance and area of paths as bars, by group.
 
     As in Fig. 7 of the paper: means, with standard deviations as whiskers.
@@ -72,8 +75,10 @@ def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed:
     from navirl_cli.evaluation.metrics import PAPER_METRICS
     from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 
-    demonstrations = demonstrations_in(demos)
-    learnt = None if reward is None else read_reward_for(reward, demonstrations)
+    refuse_unused("--reward", "samples", "seed", "everything", used=reward is not None)
+    everyone = demonstrations_in(demos)
+    learnt = None if reward is None else read_reward_for(reward, everyone)
+    demonstrations = choosing.of(everyone, [] if learnt is None else [learnt])
     result = _compared(demonstrations, learnt, samples, seed)
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     bars = bars_of(result.groups, taught)
@@ -92,15 +97,16 @@ def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed:
 )
 @page_options
 @demos_argument
+@choice_options(reward=False, trial=False)
 @section("Scene", trial_option, crop_option)
-def forces(page: Page, demos: Path, trial: str | None, crop: bool) -> None:
+def forces(page: Page, demos: Path, choosing: Choosing, trial: str | None, crop: bool) -> None:
     """Draw the forces of one trial, over time and along its path.
 
     Contacts are shaded, with peak force and impulse.
     """
     from navirl_cli.figures.forces import draw_forces
 
-    one = trial_of(demonstrations_in(demos), trial)
+    one = trial_of(choosing.of(demonstrations_in(demos)), trial)
     page.draw(lambda axes: draw_forces(axes, one, crop=crop), panels=2, columns=1)
 
 
