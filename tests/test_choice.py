@@ -6,12 +6,18 @@ import factories as make
 import numpy as np
 import pytest
 
+from navirl_cli.artefacts.demonstrations import demonstrations_document
+from navirl_cli.artefacts.rewards import reward_document
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.subset import Subset
 from navirl_cli.errors import ArgumentError, DemonstrationError
 from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.groups import Trained
 from navirl_cli.figures.overlay import driven
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.reward import Reward
 
 GRID = make.open_grid(8, 4)
 CELLS = [[0, 1], [1, 1], [2, 2], [3, 2]]
@@ -118,3 +124,19 @@ def test_paths_over_a_scene_are_of_its_participant_and_the_others_are_counted():
 )
 def test_options_that_nothing_reads_are_refused(navirl, words, message):
     assert message in navirl(*words.split(), code=2).stderr
+
+
+def test_the_scene_is_one_that_the_reward_was_learnt_from(navirl, tmp_path):
+    write_json(tmp_path / "demos.json", "demonstrations", demonstrations_document(ALL, [], {}), force=False)
+    found = fit(evidence_of([SECOND]), Reward.named({}), scan=False)
+    write_json(tmp_path / "r.json", "reward", reward_document(found, [SECOND], [], 0.1), force=False)
+    words = ("plan", "r.json", "--scene", "demos.json")
+    assert (
+        "scene of p1/2, the first of 1 of 4 demonstrations: those that the reward was learnt from; "
+        "--all takes the others too, --trial another" in navirl(*words).stderr
+    )
+    for choice in (("--all",), ("--trial", "p1/1"), ("--cycle", "1")):
+        assert "scene of" not in navirl(*words, *choice).stderr
+    assert "--cycle goes with --scene DEMOS." in navirl("plan", "r.json", "--cycle", "2", code=2).stderr
+    message = navirl(*words, "--cycle", "4", code=1).stderr
+    assert "--cycle: expected one of 'cycle 1', 'cycle 2', found 'cycle 4'" in message

@@ -16,6 +16,9 @@ from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.subset import Subset
 from navirl_cli.evaluation.choice import choose
 
+#: click's names of the options of :func:`choice_options`.
+NAMES = ("conditions", "cycles", "sets", "participants", "trials", "everything")
+
 
 @dataclass(frozen=True)
 class Choosing:
@@ -48,6 +51,22 @@ class Choosing:
         if found.note and not quiet:
             say(found.note)
         return list(found.demonstrations)
+
+    def scene_of(
+        self, demonstrations: Sequence[Demonstration], rewards: Sequence[LearntReward], *, quiet: bool = False
+    ) -> tuple[Demonstration, list[Demonstration]]:
+        """The demonstration whose scene is meant, the first chosen one, and all chosen ones; arguments as :meth:`of`.
+
+        Raises:
+            NavirlError: As of :func:`~navirl_cli.evaluation.choice.choose`.
+        """
+        trained = [one.trained(demonstrations) for one in rewards]
+        found = choose(demonstrations, self.subset, trained, everything=self.everything)
+        first = found.demonstrations[0]
+        if found.note and not quiet:
+            said = f"the first of {found.note}" if len(found.demonstrations) < len(demonstrations) else found.note
+            say(f"scene of {first.id}, {said}, `trial` another")
+        return first, list(found.demonstrations)
 
 
 def choice_options(

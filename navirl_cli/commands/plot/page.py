@@ -135,7 +135,6 @@ def scene_of(
         NavirlError: A name is unknown.
     """
     if trial is None:
-        chosen = choosing.of(demonstrations, rewards)
-        return chosen[0], chosen
+        return choosing.scene_of(demonstrations, rewards)
     one = trial_of(choosing.subset.of(demonstrations), trial)
     return one, choosing.of(demonstrations, rewards, quiet=True)
