@@ -9,7 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
+from navirl_cli.api.arguments import (
+    Point,
+    chosen,
+    one_of,
+    pairs_in,
+    points_in,
+    subset_in,
+    terms_in,
+    texts,
+    topics_in,
+    within,
+)
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
@@ -34,14 +45,16 @@ from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
+from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.evaluation.groups import FIELDS, groups_named
+from navirl_cli.evaluation.groups import groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, chosen_to_rank, ranking
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Pool, Questions, answers
@@ -244,7 +257,10 @@ def fit(
     l2: float = PAPER_L2,
     method: str = "newton",
     condition: str | Collection[str] = (),
-    cycle: int | None = None,
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
     only_corrected: bool = False,
     truncated: bool = False,
     steps: str = "all",
@@ -273,8 +289,11 @@ def fit(
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
             of 10 /m, without the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
-        condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
-        cycle: Use trials of this cycle only.
+        condition: Only trials of these conditions: "force", "joystick", "autonomous"; one or several.
+        cycle: Only trials of these cycles; one or several.
+        set: Only trials of these sets; "main task" are those of none.
+        participant: Only trials of these participants.
+        trial: Only these trials, by their ids.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, those during "contact", or those in contact or within the person's reach
@@ -315,12 +334,11 @@ def fit(
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
-    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    subset = subset_in(condition, cycle, set, participant, trial)
     reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
         demos,
-        conditions=conditions,
-        cycle=cycle,
+        subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=which,
@@ -349,7 +367,7 @@ def fit(
     )
     notes = (
         *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
+        *remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos),
         *reach_unused(document, reach_m),
         *fit_warnings(document),
     )
@@ -366,6 +384,12 @@ def evaluate(
     reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
     *,
     metrics: str | Sequence[str] = (),
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     by: str | Collection[str] = (),
     pair: tuple[str, str] | Sequence[tuple[str, str]] = (),
     ranks: bool = False,
@@ -379,6 +403,13 @@ def evaluate(
         demos: Demonstrations, or their file.
         reward: A reward, its file, values by name of parameter; or several rewards by name.
         metrics: Names of metrics, or "all"; the paper's three by default.
+        condition: Only trials of these conditions, as of :func:`fit`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials. By default those that the rewards were learnt from, where that is known, and those to compare
+            with.
         by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
         ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
@@ -397,8 +428,8 @@ def evaluate(
     Example:
         >>> navirl.evaluate(demos, reward).to_frame()[["group", "path_type", "length_m_mean"]]
     """
-    demos = demonstrations_in(demos)
-    rewards = _rewards(reward, demos)
+    everyone = demonstrations_in(demos)
+    rewards = _rewards(reward, everyone)
     if ranks and len(rewards) != 1:
         raise ArgumentError("`ranks` needs one `reward`")
     measured = _metrics(metrics)
@@ -408,9 +439,13 @@ def evaluate(
         None if precision is None else within("precision", precision, 1e-3, 1),
     )
     asked = pairs_in(pair)
-    groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
-    one = next(iter(rewards.values()), None)
-    trained = one.trained(demos) if ranks and isinstance(one, LearntReward) else None
+    subset = subset_in(condition, cycle, set, participant, trial)
+    known = [one.trained(everyone) if isinstance(one, LearntReward) else None for one in rewards.values()]
+    trained = known[0] if ranks else None
+    named = groups_named(subset.of(everyone), [name for one in asked for name in one], fields, "pair")
+    also = [one for own in (*named, *([chosen_to_rank(everyone, trained)[0]] if ranks else [])) for one in own]
+    taken = choose(everyone, subset, known, everything=all, also=also)
+    demos = taken.demonstrations
     if ranks:
         check_to_rank(demos, trained)
     rng = np.random.default_rng(seed)
@@ -420,10 +455,10 @@ def evaluate(
     ranked = Ranking()
     if ranks:
         ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
-    inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
+    inputs = [*sources_behind(everyone), *(file for one in rewards.values() for file in files_behind(one))]
     document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
     _warn(result.notes)
-    return Evaluation(result, measured, compared, ranked, document)
+    return Evaluation(result, measured, compared, ranked, document, (taken.note,) if taken.note else ())
 
 
 def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> ScenePolicy:

@@ -17,6 +17,8 @@ from navirl_cli.artefacts.versions import VERSION, is_known, upgraded
 from navirl_cli.errors import ArtefactError, brief
 from navirl_cli.files import read_regular, replacing
 
+#: The kinds of artefacts.
+KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
@@ -51,13 +53,51 @@ def read_json(path: Path, artefact: str) -> dict[str, Any]:
     Raises:
         ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
+    return _checked(_content(path, artefact), path, artefact)
+
+
+def read_any(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read an artefact of any kind.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its kind, as in :func:`write_json`, and its content as of :func:`read_json`.
+
+    Raises:
+        ArtefactError: As in :func:`read_json`.
+    """
+    document = _content(path, " or ".join(KINDS))
+    found = document.get("format") if isinstance(document, dict) else None
+    kind = next((kind for kind in KINDS if found == f"navirl/{kind}"), None)
+    if kind is None:
+        what = f"format {brief(found)}" if isinstance(found, str) else "other JSON"
+        raise ArtefactError(f"{path}: expected a file of navirl {' or '.join(KINDS)}, found {what}")
+    return kind, _checked(document, path, kind)
+
+
+def _content(path: Path, artefact: str) -> Any:
+    """The content of a JSON file.
+
+    Raises:
+        ArtefactError: It cannot be read.
+    """
     try:
-        document = _parsed(read_regular(path).decode("utf-8"))
+        return _parsed(read_regular(path).decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
         raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
+
+
+def _checked(document: Any, path: Path, artefact: str) -> dict[str, Any]:
+    """A file's content in the present version, checked.
+
+    Raises:
+        ArtefactError: It is another artefact, or does not fit the schema.
+    """
     found = document.get("format") if isinstance(document, dict) else None
     if found != f"navirl/{artefact}":
         what = f"a file of format {brief(found)}" if isinstance(found, str) else "other JSON"

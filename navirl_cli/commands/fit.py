@@ -9,6 +9,7 @@ import click
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     check_output,
@@ -136,8 +137,7 @@ def fit(
     pool: str,
     l2: float,
     method: str,
-    conditions: tuple[str, ...],
-    cycle: int | None,
+    choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
     steps: str,
@@ -168,8 +168,7 @@ def fit(
     everyone = demonstrations_in(demos)
     selected = select(
         everyone,
-        conditions=conditions,
-        cycle=cycle,
+        choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
@@ -198,7 +197,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
     for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
         say(line)
     finish(lost)

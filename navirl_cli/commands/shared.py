@@ -71,25 +71,6 @@ def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ..
     return chosen
 
 
-def refuse_unused(needs: str, *parameters: str) -> None:
-    """Refuse options of the present command that were given without what they act on.
-
-    Args:
-        needs: What they need, for the message.
-        parameters: Names of their parameters.
-
-    Raises:
-        UsageError: One was given.
-    """
-    context = click.get_current_context()
-    for one in context.command.params:
-        given = context.get_parameter_source(one.name or "") is click.core.ParameterSource.COMMANDLINE
-        if one.name in parameters and given:
-            raise click.UsageError(
-                f"{one.opts[0]} changes nothing without {needs}; add that, or leave out {one.opts[0]}."
-            )
-
-
 def demonstrations_in(path: Path) -> list[Demonstration]:
     """The demonstrations of a file; an error if it holds none.
 
