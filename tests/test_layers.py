@@ -13,6 +13,7 @@ ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
         ["files", "parallel", "documents"],
+        ["cluster"],
         ["logs"],
         ["demos"],
         ["irl"],

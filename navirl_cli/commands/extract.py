@@ -6,6 +6,7 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands.shared import (
     bytes_bar,
     check_output,
@@ -24,6 +25,7 @@ from navirl_cli.commands.shared import (
     split_option,
     topic_option,
     topics_by_role,
+    workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath, Number, Point
 from navirl_cli.commands.usage import Command, Example, section
@@ -146,6 +148,7 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
         help="Radius by which the map is inflated, m.  [default: from the log's session record, else 0.3]",
     ),
 )
+@workers_options
 @section("Output", output_option("Demonstrations file to write."), json_option, force_option)
 def extract(
     logs: tuple[Path, ...],
@@ -175,6 +178,8 @@ def extract(
     time_source: str,
     join: bool,
     strict: bool,
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -223,8 +228,10 @@ def extract(
         strict=strict,
     )
     labels = None if trials is None else read_labels(trials)
-    with bytes_bar("extract") as update:
-        found = extract_recordings(logs, settings, options, join=join, labels=labels, progress=update)
+    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+        found = extract_recordings(
+            logs, settings, options, join=join, labels=labels, executor=executor, progress=update
+        )
     demonstrations = found.demonstrations()
     inputs = [*found.inputs, *map(Input.of, files)]
     document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file, trials))
