@@ -12,8 +12,8 @@ PACKAGE = Path(navirl_cli.__file__).parent
 ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
-        ["files", "parallel", "documents"],
-        ["cluster"],
+        ["files", "parallel"],
+        ["documents", "cluster"],
         ["logs"],
         ["demos"],
         ["irl"],

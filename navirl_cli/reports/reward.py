@@ -16,9 +16,10 @@ from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
-from navirl_cli.evaluation.ranks import Rank, Ranking
+from navirl_cli.evaluation.ranks import Ranking
+from navirl_cli.planning.problem import problem_of
 from navirl_cli.reports.evaluation import group_table
-from navirl_cli.reports.evidence import reach_line
+from navirl_cli.reports.evidence import evidence_remarks, reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
@@ -34,6 +35,7 @@ from navirl_cli.reports.fit import (
     warnings,
 )
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
+from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
 
 _CAPTIONS = {
@@ -73,7 +75,8 @@ def report_of(
     notes = repeated(demonstrations)
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
-        *_warnings(content, ranked.ranks),
+        *_recommendation(demonstrations, learnt, seed),
+        *_warnings(demonstrations, learnt, content, ranked),
         Heading("Parameters"),
         formula(learnt.reward.terms),
         parameter_table(content),
@@ -102,6 +105,12 @@ def report_of(
         Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
+
+
+def _recommendation(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Block]:
+    """How to drive by the reward, on open ground and in the scene of the first demonstration that it is from."""
+    shown = next((one for one in demonstrations if one.id in learnt.demonstrations), demonstrations[0])
+    return recommendation_blocks(learnt, problem_of(shown), shown.id, seed)
 
 
 def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any]) -> str:
@@ -158,10 +167,14 @@ def _rank_blocks(learnt: LearntReward, ranked: Ranking) -> list[Block]:
     return [*tables, *([Bullets(lines)] if lines else [])]
 
 
-def _warnings(content: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
+def _warnings(
+    demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any], ranked: Ranking
+) -> list[Block]:
     """What a reader should know before trusting the numbers."""
-    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in warnings(content)]
-    bad = ", ".join(one.id for one in ranks if one.fits_badly)
+    taught = [one for one in demonstrations if one.id in learnt.demonstrations]
+    said = [*evidence_remarks(taught, demonstrations), *warnings(content)]
+    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in said]
+    bad = ", ".join(one.id for one in ranked.bad)
     if bad:
         lines.append(f"The policy rarely takes paths like those of {bad}; see the ranks.")
     return [Heading("Warnings"), Bullets(tuple(lines))] if lines else []
