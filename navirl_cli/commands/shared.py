@@ -188,25 +188,27 @@ def finish(lost: Sequence[str]) -> None:
 
 
 @contextmanager
-def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
     """A progress bar over the bytes of logs in sequence, if stderr is a terminal.
 
     Args:
         label: The present work.
 
     Yields:
-        A function that takes the bytes done and the total bytes.
+        A function that takes the bytes done, the total bytes and, if it likes, a short text.
     """
     if not sys.stderr.isatty():
-        yield lambda _done, _total: None
+        yield lambda _done, _total, _word="": None
         return
-    with _finished(click.progressbar(length=1, label=label, file=sys.stderr, width=30)) as bar:
+    with _finished(
+        click.progressbar(length=1, label=label, file=sys.stderr, width=30, item_show_func=lambda word: word or None)
+    ) as bar:
 
-        def update(done: int, total: int) -> None:
+        def update(done: int, total: int, word: str = "") -> None:
             if done < bar.pos:
                 bar.pos = 0
             bar.length = max(total, 1)
-            bar.update(done - bar.pos)
+            bar.update(done - bar.pos, word)
 
         yield update
 

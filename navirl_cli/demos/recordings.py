@@ -32,7 +32,7 @@ from navirl_cli.parallel import as_completed
 #: The hashes of a recording's files, and its demonstrations.
 _Result = tuple[tuple[Input, ...], Extraction]
 #: A recording, and what is stated of its trials.
-_Job = tuple[Source, tuple[Label, ...]]
+Job = tuple[Source, tuple[Label, ...]]
 
 
 @dataclass(frozen=True)
@@ -90,15 +90,11 @@ def extract_recordings(
     Raises:
         NavirlError: No recording gave a demonstration, or labels do not fit the logs or the settings.
     """
-    refused: list[LogError] = []
-    if isinstance(executor, Cluster):  # whose workers have another working directory
-        logs = [Path(log).absolute() for log in logs]
-    # where all are pieces of one recording none may be missing
-    sources = sources_of(logs, join=join, refused=None if join else refused)
-    rows, label_notes = _rows(labels, sources, settings)
+    sources, refused = sources_for(logs, executor, join=join)
+    rows, label_notes = rows_of(labels, sources, settings)
     # a lone recording is read here, so that the progress can follow its bytes
     alone = len(sources) + len(refused) == 1
-    work = partial(_extracted, settings=settings, options=options, progress=progress if alone else None, alone=alone)
+    work = partial(extracted, settings=settings, options=options, progress=progress if alone else None, alone=alone)
     good: dict[tuple[str, ...], _Result] = {}
     failed: list[NavirlError] = [*refused]
     for source, result in zip(sources, _results(work, sources, rows, executor, progress), strict=True):
@@ -123,7 +119,18 @@ def extract_recordings(
     )
 
 
-def _rows(
+def sources_for(
+    logs: Sequence[Path | str], executor: Executor | None, *, join: bool
+) -> tuple[list[Source], list[LogError]]:
+    """The recordings among the arguments, and why others are none; arguments as in :func:`extract_recordings`."""
+    refused: list[LogError] = []
+    if isinstance(executor, Cluster):  # whose workers have another working directory
+        logs = [Path(log).absolute() for log in logs]
+    # where all are pieces of one recording none may be missing
+    return sources_of(logs, join=join, refused=None if join else refused), refused
+
+
+def rows_of(
     labels: Labels | None, sources: Sequence[Source], settings: ExtractSettings
 ) -> tuple[list[tuple[Label, ...]], list[str]]:
     """The rows of labels of each recording, and notes on the others."""
@@ -148,7 +155,7 @@ def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
 
 
 def _results(
-    work: Callable[[_Job], _Result | NavirlError],
+    work: Callable[[Job], _Result | NavirlError],
     sources: Sequence[Source],
     rows: Sequence[tuple[Label, ...]],
     executor: Executor | None,
@@ -168,8 +175,8 @@ def _results(
     return [found[number] for number in range(len(sources))]
 
 
-def _extracted(
-    job: _Job,
+def extracted(
+    job: Job,
     settings: ExtractSettings,
     options: LoadOptions,
     progress: Progress | None,
