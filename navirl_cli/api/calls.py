@@ -45,10 +45,10 @@ from navirl_cli.evaluation.paired import pairs_of
 from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
-from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.analyses import Pool, Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.intervals import Kind
+from navirl_cli.irl.intervals import ASKED, Kind
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
@@ -245,6 +245,7 @@ def fit(
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
+    pool: str = "all",
     l2: float = PAPER_L2,
     method: str = "newton",
     condition: str | Collection[str] = (),
@@ -274,6 +275,8 @@ def fit(
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
+        pool: "all": one reward for all participants; "persons": a typical one, and one for each person (random effects
+            on the logarithms of the parameters).
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
             of 10 /m, without the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
@@ -315,7 +318,8 @@ def fit(
         texts(profile),
         cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
         seed,
-        None if intervals is None else chosen(Kind, intervals, "intervals"),
+        None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
+        chosen(Pool, pool, "pool"),
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)

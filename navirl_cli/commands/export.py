@@ -94,7 +94,7 @@ COUNT = 5
 def export(
     reward: Path, target: str, output: Path | None, seed: int, as_json: bool, force: bool, **options: Any
 ) -> None:
-    """Write a learnt reward for other programs.
+    """Write a learnt reward for Nav2, for viewers, or in other conventions.
 
     For Nav2, a folder: fragments of parameter files, a mask of a scene, a node that makes masks of people who move, and
     a README that says what to do with them and what they do not hold. For viewers, a log: map, reward and visits as

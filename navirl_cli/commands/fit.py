@@ -32,11 +32,11 @@ from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
-from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.analyses import Pool, Questions, answers
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
+from navirl_cli.irl.intervals import ASKED, FEW_DEMONSTRATIONS, Kind
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
@@ -75,6 +75,14 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init it also "
         "gives the initial values.",
     ),
+    click.option(
+        "--pool",
+        type=Choice([pool.value for pool in Pool]),
+        default=Pool.ALL.value,
+        show_default=True,
+        help="One reward for all participants; or a typical one and one for each person, drawn towards the typical one "
+        "as far as the own demonstrations leave it open (random effects on the logarithms of the parameters).",
+    ),
     l2_option,
     click.option(
         "--method",
@@ -94,7 +102,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     "Uncertainty",
     click.option(
         "--intervals",
-        type=Choice([kind.value for kind in Kind]),
+        type=Choice([kind.value for kind in ASKED]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
         f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
         "wald; wald with a term of turns, where profiles take minutes.",
@@ -128,6 +136,7 @@ def fit(
     terms: tuple[Term, ...],
     initial: str,
     prior_file: Path | None,
+    pool: str,
     l2: float,
     method: str,
     conditions: tuple[str, ...],
@@ -154,7 +163,7 @@ def fit(
     standard errors.
     """
     kind = None if intervals is None else Kind(intervals)
-    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind)
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool))
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)

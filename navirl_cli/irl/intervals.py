@@ -50,6 +50,12 @@ class Kind(StrEnum):
     PROFILE = "profile"
     WALD = "wald"
     NONE = "none"
+    #: Of a fit with random effects over participants, which has its own.
+    POSTERIOR = "posterior"
+
+
+#: Those that can be asked of a fit.
+ASKED = (Kind.PROFILE, Kind.WALD, Kind.NONE)
 
 
 class Errors(StrEnum):

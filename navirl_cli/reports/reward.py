@@ -34,6 +34,7 @@ from navirl_cli.reports.fit import (
     validation_tables,
     warnings,
 )
+from navirl_cli.reports.persons import person_blocks
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
@@ -81,6 +82,7 @@ def report_of(
         formula(learnt.reward.terms),
         parameter_table(content),
         *interval_notes(content),
+        *person_blocks(content),
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
