@@ -52,8 +52,10 @@ from navirl_cli.reports.extraction import gain_table, log_table, published_notes
     cls=Command,
     examples=[
         Example("A trial for each goal that the logs announce", "navirl extract p01.mcap p02.mcap -o demos.json"),
-        Example("All logs of a folder, with a named topic", "navirl extract logs --topic wrench=/wrench -o demos.json"),
-        Example("One file a log, and only logs that are new or have changed", "navirl extract logs -o demos/"),
+        Example(
+            "A file for each log of a folder, where it is new or has changed; with a named topic",
+            "navirl extract logs --topic wrench=/wrench -o demos/",
+        ),
         Example("Labels of each trial from a table", "navirl extract p01.mcap --trials trials.csv -o demos.json"),
     ],
 )
