@@ -215,7 +215,7 @@ class TestPlots:
             *(getattr(navirl.plot, name)(reward, one) for name in ("policy", "reward", "value", "actions")),
             *navirl.plot.properties(demos, reward, samples=10),
             *navirl.plot.forces(one),
-            navirl.plot.ranks(demos, reward, samples=10),
+            *navirl.plot.ranks(demos, reward, samples=10),
             *navirl.plot.convergence(reward),
             navirl.plot.profile(reward, "sigma_p"),
         ]

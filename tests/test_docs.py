@@ -23,6 +23,7 @@ SLOW = {
     "gallery.md",
     "index.md",
     "nav2-study.md",
+    "other-rewards.md",
     "published-study.md",
     "several-rewards.md",
 }

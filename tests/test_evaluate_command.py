@@ -29,8 +29,8 @@ def work(tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluate")
     for words in (
         ["extract", *LOGS, "-o", folder / "demos.json"],
-        ["fit", folder / "demos.json", "--cycle", 2, "-o", folder / "learnt.json"],
-        ["fit", folder / "demos.json", "--cycle", 1, "-o", folder / "first.json"],
+        ["fit", folder / "demos.json", "--cycle", 2, "--intervals", "wald", "-o", folder / "learnt.json"],
+        ["fit", folder / "demos.json", "--cycle", 1, "--intervals", "wald", "-o", folder / "first.json"],
     ):
         assert CliRunner().invoke(cli, [str(word) for word in words]).exit_code == 0
     return folder
@@ -155,10 +155,23 @@ def test_ranks_are_printed_with_their_test(navirl, work):
     document = json.loads(navirl(*words, "-o", "m.json", "--json").stdout)
     ranks = document["ranks"]
     assert read_json(Path("m.json"), "metrics")["ranks"] == ranks
-    assert len(ranks["demonstrations"]) == 21
-    found = stats.kstest([one["rank"] for one in ranks["demonstrations"]], "uniform")
-    assert (ranks["statistic"], ranks["p_value"]) == pytest.approx((found.statistic, found.pvalue))
-    assert "ranks of 21 demonstrations among the policy's paths" in navirl(*words).stdout
+    groups = {one["group"]: one for one in ranks["groups"]}
+    for name, own in groups.items():
+        shares = [one["rank"] for one in ranks["demonstrations"] if one["group"] == name]
+        found = stats.kstest(shares, "uniform")
+        assert (own["statistic"], own["p_value"]) == pytest.approx((found.statistic, found.pvalue))
+        assert own["count"] == len(shares)
+        assert own["held_out"] is False
+    learnt = set(read_json(work / "learnt.json", "reward")["groups"])
+    assert set(groups) == learnt, "conditions that were not learnt from are not ranked"
+    assert sum(ranks["not_ranked"].values()) + len(ranks["demonstrations"]) == 21
+    text = navirl(*words).stdout
+    assert "Ranks of demonstrations among the policy's paths, by group" in text
+    for name, count in ranks["not_ranked"].items():
+        assert (
+            f"{name} ({count})"
+            in text[text.index("Not ranked, because the reward was not learnt from such trials: ") :]
+        )
     assert "--ranks needs one --reward" in navirl("evaluate", work / "demos.json", "--ranks", code=2).stderr
 
 

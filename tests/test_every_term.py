@@ -17,6 +17,7 @@ from navirl_cli.cli import cli
 from navirl_cli.errors import NavirlWarning
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.terms import TERMS, registry
+from navirl_cli.reports import recommendation
 
 SCENE = make.scene_on(make.open_grid(16, 12), [0, 5], [15, 5], [[0.8, 0.3]])
 OWN = Path(__file__).with_name("toy_term.py")
@@ -44,7 +45,7 @@ def folder(tmp_path_factory):
     write_json(folder / "demos.json", "demonstrations", demonstrations_document(shown, [], {}), force=False)
     for term in EVERY:
         last = TERMS[term].parameters[-1].name if term in TERMS else "s_y"
-        asked = ["--terms", words_of(term), "--profile", last, "--cross-validate", "participant"]
+        asked = ["--terms", words_of(term), "--intervals", "wald", "--profile", last, "--cross-validate", "participant"]
         words = ["fit", str(folder / "demos.json"), *asked, "-o", str(folder / f"{term}.json")]
         result = CliRunner().invoke(cli, words, catch_exceptions=False)
         assert result.exit_code in {0, 3}, result.output
@@ -102,7 +103,8 @@ def test_fit_evaluate_and_python(run, term):
 
 
 @drawn_terms
-def test_every_figure_and_page(run, term):
+def test_every_figure_and_page(run, term, monkeypatch):
+    monkeypatch.setattr(recommendation, "DRAWS", 2)
     reward = f"{term}.json"
     for kind in ("policy", "reward", "value", "actions"):
         run("plot", kind, "demos.json", "--reward", reward, "--overlay", "samples", "-o", f"{kind}.png")

@@ -3,12 +3,14 @@
 import json
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import published_factory as forge
 import pytest
 from click.testing import CliRunner
 from command_line import commands, options
+from rerun_fake import fake_rerun
 
 from navirl_cli.cli import cli
 from navirl_cli.commands.usage import Command
@@ -50,7 +52,7 @@ def folder(tmp_path_factory):
     files = forge.participant()
     (folder / "runs.tar.gz").write_bytes(forge.archive({f"runs/p1/{name}": data for name, data in files.items()}))
     (folder / "trials.csv").write_text(CliRunner().invoke(cli, ["inspect", str(SAMPLES[0]), "--trials"]).stdout)
-    fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2"]
+    fit = ["fit", "demos.json", "--condition", "force", "--cycle", "2", "--intervals", "wald"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for words in (
@@ -114,10 +116,11 @@ TABLES = {
     "inspect": ["p01.mcap"],
     "annotate": ["p01.mcap", "trials.csv", "-o", "new.mcap"],
     "extract": ["p01.mcap", "-o", "new.json"],
-    "fit": ["demos.json", "--cycle", "2", "-o", "new.json"],
+    "fit": ["demos.json", "--cycle", "2", "--intervals", "wald", "-o", "new.json"],
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],
+    "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
     "simulate": ["--participants", "1", "-o", "new"],
     "study": ["demos.json", "--samples", "20", "-o", "new"],
@@ -171,6 +174,7 @@ def keys_in(document, by_data=False):
 @pytest.mark.parametrize("line", [marked(line) for words, _ in commands() for line in examples_in(help_of(*words))])
 def test_examples_run(folder, tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "rerun", fake_rerun())
     words = shlex.split(line)[1:]
     output = words[words.index("-o") + 1] if "-o" in words else None
     for path in folder.iterdir():

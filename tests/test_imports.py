@@ -37,7 +37,7 @@ def run(folder, words):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("imports")
     run(folder, ["extract", str(LOG), "-o", "demos.json"])
-    run(folder, ["fit", "demos.json", "--cycle", "2", "-o", "reward.json"])
+    run(folder, ["fit", "demos.json", "--cycle", "2", "--intervals", "wald", "-o", "reward.json"])
     return folder
 
 

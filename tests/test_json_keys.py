@@ -30,6 +30,8 @@ WITHOUT = {
         "trial",
         "labelled",
         "messages",
+        "steps_all",
+        "steps_reachable",
         "gaps",
         "cells",
     ),
@@ -48,6 +50,9 @@ WITHOUT = {
     *("identified_draws", "counts", "median", "cells_equal", "theta_participants"),
     *("precision", "rank", "rank_biserial", "cohen_dz", "wilcoxon_p", "p_value", "statistic", "level", "l2"),
     *("condition_number", "mismatch_standard_errors", "parameter_count"),
+    # how people are scattered: of logarithms
+    *("log_mean", "log_covariance", "scatter", "scatter_lower", "scatter_upper", "scatter_rms"),
+    *("draws", "effective_draws"),
 }
 #: Nanoseconds are for times of day only: beside them, n_s is newton seconds.
 TIMES_NS = {"start_ns", "end_ns"}

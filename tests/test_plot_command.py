@@ -192,9 +192,16 @@ def test_a_file_without_valid_iterations_is_refused(navirl, files, change, messa
 
 
 def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
-    words = ("ranks", files / "demos.json", "--reward", files / "reward.json", "--samples", "50")
-    assert figure_of(*words).axes[0].get_title().startswith("n = 2, p ")
-    assert figure_of(*words, "--group", "joystick").axes[0].get_title().startswith("n = 1, p ")
+    content = json.loads((files / "reward.json").read_text())
+    Path("force.json").write_text(json.dumps({**content, "demonstrations": ["p01/1"], "groups": ["force, cycle 1"]}))
+    words = ("ranks", files / "demos.json", "--reward", "force.json", "--samples", "50")
+    (learnt,) = figure_of(*words).axes
+    assert learnt.get_title().startswith("force, cycle 1\nn = 1, p "), "the joystick was not learnt from"
+    (other,) = figure_of(*words, "--group", "joystick").axes
+    assert other.get_title().startswith("joystick\nn = 1, p ")
+    both = figure_of(*words, "--group", "joystick", "--group", "force, cycle 1").axes
+    assert [one.get_title().split("\n")[0] for one in both] == ["joystick", "force, cycle 1"]
+    assert both[0].get_position().y0 > both[1].get_position().y1, "in a narrow page below each other"
     message = navirl("plot", *words, "--group", "joystik", "-o", "c.svg", code=1).stderr
     assert "--group: expected one of 'force, cycle 1', 'joystick', found 'joystik'; did you mean 'joystick'?" in message
 

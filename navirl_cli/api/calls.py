@@ -41,13 +41,13 @@ from navirl_cli.evaluation.drawn import MOST, Precision
 from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
-from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.analyses import Pool, Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.intervals import Kind
+from navirl_cli.irl.intervals import ASKED, Kind
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
@@ -61,6 +61,7 @@ from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.session import MOST_CYCLES
 from navirl_cli.logs.sources import sources_of
 from navirl_cli.parallel import cores
+from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
@@ -239,6 +240,7 @@ def fit(
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
+    pool: str = "all",
     l2: float = PAPER_L2,
     method: str = "newton",
     condition: str | Collection[str] = (),
@@ -266,6 +268,8 @@ def fit(
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
+        pool: "all": one reward for all participants; "persons": a typical one, and one for each person (random effects
+            on the logarithms of the parameters).
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
             of 10 /m, without the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
@@ -305,7 +309,8 @@ def fit(
         texts(profile),
         cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
         seed,
-        None if intervals is None else chosen(Kind, intervals, "intervals"),
+        None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
+        chosen(Pool, pool, "pool"),
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
@@ -345,6 +350,7 @@ def fit(
     notes = (
         *cannot_learn(selected.demonstrations),
         *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
+        *reach_unused(document, reach_m),
         *fit_warnings(document),
     )
     reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}
@@ -375,7 +381,8 @@ def evaluate(
         metrics: Names of metrics, or "all"; the paper's three by default.
         by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
-        ranks: Rank each demonstration by likelihood among paths sampled from the policy.
+        ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
+            group, for the groups that the reward was learnt from.
         samples: Number of paths sampled from each policy in each scene.
         precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
             deviation.
@@ -402,11 +409,17 @@ def evaluate(
     )
     asked = pairs_in(pair)
     groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
+    one = next(iter(rewards.values()), None)
+    trained = one.trained(demos) if ranks and isinstance(one, LearntReward) else None
+    if ranks:
+        check_to_rank(demos, trained)
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
     result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
     compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in asked]
-    ranked = ranks_of(demos, next(iter(learnt.values())), drawing.samples, rng) if ranks else []
+    ranked = Ranking()
+    if ranks:
+        ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
     inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
     document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
     _warn(result.notes)

@@ -21,9 +21,9 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, ArtefactError
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import group_of
+from navirl_cli.evaluation.groups import group_of, groups_named
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.evaluation.ranks import ranks_of, uniformity
+from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
@@ -32,7 +32,7 @@ from navirl_cli.figures.overlay import alike, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
-from navirl_cli.figures.ranks import draw_ranks
+from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
 from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
@@ -237,31 +237,40 @@ def ranks(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward,
     *,
-    axes: "Axes | None" = None,
+    group: str | Sequence[str] = (),
     samples: int = 1000,
     seed: int = 0,
     **page: Unpack[PageOptions],
-) -> "Axes":
-    """Draw the ranks of demonstrations among paths of the policy: uniform if the policy is right.
+) -> "list[Axes]":
+    """Draw the ranks of demonstrations among paths of the policy by group: uniform if the policy is right.
 
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
-        axes: Axes to draw on; a new figure by default.
+        group: Groups to rank; by default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
         **page: As in :class:`PageOptions`.
 
     Returns:
-        The axes.
+        The axes of the panels, one for each group.
 
     Raises:
-        NavirlError: A scene has no policy under the reward, or the figure cannot be written.
+        NavirlError: A scene has no policy under the reward, no demonstration is like those that it was learnt from, or
+            the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
-    found = ranks_of(demonstrations, reward_in(reward, demonstrations), samples, np.random.default_rng(seed))
-    shares = np.array([one.rank for one in found])
-    return _drawn(lambda panels: draw_ranks(panels[0], shares, uniformity(found)[1]), _own(axes), page)[0]
+    parameters = reward_in(reward, demonstrations)
+    known = isinstance(reward, str | Path | LearntReward)
+    trained = learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]
+    if names := texts(group):
+        chosen = [one for own in groups_named(demonstrations, names) for one in own]
+    else:
+        check_to_rank(demonstrations, trained)
+        chosen, _ = chosen_to_rank(demonstrations, trained)
+    found = ranks_of(chosen, parameters, samples, np.random.default_rng(seed), trained=trained)
+    panels = by_group_and_training(found)
+    return _drawn(lambda axes: draw_rank_panels(axes, panels), None, page, **rank_layout(len(panels), _width_in(page)))
 
 
 def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) -> "list[Axes]":

@@ -20,7 +20,7 @@ from navirl_cli.errors import ArgumentError, MissingPackageError, unknown
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.metrics import Metric
 from navirl_cli.evaluation.paired import Paired
-from navirl_cli.evaluation.ranks import Rank
+from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.files import Input, check_writable
 from navirl_cli.irl.analyses import Analyses
 from navirl_cli.irl.fit import Fit
@@ -291,14 +291,14 @@ class Evaluation:
         comparison: Mean and spread by group and type of path; every demonstration as driven.
         metrics: The requested metrics.
         pairs: Groups compared by participant.
-        ranks: Ranks of the demonstrations among paths of the policy.
+        ranks: Ranks of the demonstrations among paths of the policy, and how many were not ranked.
         document: The content of a metrics file.
     """
 
     comparison: Comparison
     metrics: tuple[Metric, ...]
     pairs: Sequence[tuple[str, str, Mapping[str, Paired]]]
-    ranks: Sequence[Rank]
+    ranks: Ranking
     document: Mapping[str, Any]
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.evaluation.metrics import Metric, Values
 from navirl_cli.evaluation.paired import Interval, Paired
-from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.evaluation.ranks import Ranking, by_group_and_training, uniformity
 from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
@@ -20,7 +20,7 @@ Pairs = Sequence[tuple[str, str, Mapping[str, Paired]]]
 def metrics_document(
     result: Comparison,
     pairs: Pairs,
-    ranks: Sequence[Rank],
+    ranked: Ranking,
     metrics: Sequence[Metric],
     inputs: Sequence[Input],
     precision: Precision,
@@ -31,7 +31,7 @@ def metrics_document(
     Args:
         result: Metrics by group.
         pairs: Comparisons of groups.
-        ranks: Of demonstrations; empty if they were not asked for.
+        ranked: Ranks of demonstrations; empty if they were not asked for.
         metrics: That were asked for.
         inputs: The files that it was made from.
         precision: How many paths were drawn.
@@ -52,7 +52,7 @@ def metrics_document(
             {"group": one, "minus": other, "metrics": {name: _pair(value) for name, value in found.items()}}
             for one, other, found in pairs
         ],
-        "ranks": None if not ranks else _ranks(ranks),
+        "ranks": None if not ranked.ranks else _ranks(ranked),
     }
 
 
@@ -117,14 +117,34 @@ def _interval(name: str, interval: Interval | None) -> dict[str, float | None]:
     return {f"{name}_{end}": number(value) for end, value in zip(("lower", "upper"), ends, strict=True)}
 
 
-def _ranks(ranks: Sequence[Rank]) -> dict[str, Any]:
-    """Ranks and their test."""
-    statistic, p_value = uniformity(ranks)
+def _ranks(ranked: Ranking) -> dict[str, Any]:
+    """Ranks and their test by group."""
+    groups = []
+    for own in by_group_and_training(ranked.ranks):
+        statistic, p_value = uniformity(own.ranks)
+        groups.append(
+            {
+                "group": own.group,
+                "held_out": own.held_out,
+                "count": len(own.ranks),
+                "statistic": statistic,
+                "p_value": p_value,
+            }
+        )
     return {
-        "statistic": statistic,
-        "p_value": p_value,
+        "groups": groups,
+        "not_ranked": dict(ranked.not_ranked),
         "demonstrations": [
-            {"id": one.id, "group": one.group, "log_likelihood": number(one.log_likelihood), "rank": one.rank}
-            for one in ranks
+            {
+                "id": one.id,
+                "group": one.group,
+                "log_likelihood": number(one.log_likelihood),
+                "rank": one.rank,
+                "distance_rank": one.distance_rank,
+                "area_rank": one.area_rank,
+                "held_out": one.held_out,
+                "fits_badly": one.fits_badly,
+            }
+            for one in ranked.ranks
         ],
     }

@@ -17,14 +17,16 @@ from navirl_cli.artefacts.analyses import (
     reach_document,
     validation_document,
 )
+from navirl_cli.artefacts.persons import names_of_persons, of_person, others_of, population_document
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
-from navirl_cli.evaluation.groups import by_evidence_group
+from navirl_cli.evaluation.groups import Trained, by_evidence_group
 from navirl_cli.files import Input
-from navirl_cli.irl.analyses import Analyses
+from navirl_cli.irl.analyses import Analyses, Pool
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import Intervals
+from navirl_cli.irl.newcomer import Others
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import Profile
 from navirl_cli.irl.reward import Reward, parameters_of, terms_with
@@ -63,17 +65,39 @@ class LearntReward(ByContent):
     profiles: tuple[Profile, ...] = ()
     #: Groups of these demonstrations; None for files from before they were written.
     groups: tuple[str, ...] | None = None
+    participants: tuple[str, ...] = ()
     #: None for files from before it was written.
     search: Search | None = None
     #: Intervals of the parameters, by participant first; none in files from before they were written.
     intervals: tuple[Intervals, ...] = ()
+    #: People whose own rewards the file holds beside this typical one; none for one reward for all.
+    persons: tuple[str, ...] = ()
+    #: What these people say about the next one.
+    others: Others | None = None
+
+    def trained(self, demonstrations: Sequence[Demonstration]) -> Trained | None:
+        """What it was learnt from; None where neither its file nor the demonstrations say which groups.
+
+        Args:
+            demonstrations: Among them perhaps those from which it was learnt.
+        """
+        ids = frozenset(self.demonstrations)
+        own = [one for one in demonstrations if one.id in ids]
+        groups = frozenset(by_evidence_group(own) if self.groups is None else self.groups)
+        people = frozenset(self.participants) or frozenset(one.participant for one in own)
+        return Trained(ids, people, groups) if groups else None
 
     def as_prior(self) -> Prior:
         """The prior that this fit gives to the next one.
 
         Raises:
-            RewardError: The fit did not reach its maximum, or its covariance is not positive definite.
+            RewardError: The fit did not reach its maximum, its covariance is not positive definite, or it is of people
+                who differ.
         """
+        if self.others is not None:
+            raise RewardError(
+                "`prior`: expected one reward, found one for each person; say whose reward to learn with `person`"
+            )
         if self.status in {Status.STOPPED_EARLY, Status.INFINITE}:
             raise RewardError(
                 f"`prior`: expected a fit at its maximum, found one that ended with {self.status.value}; fit it again"
@@ -120,6 +144,7 @@ def reward_document(
         "log_likelihood_uniform": fit.log_likelihood_uniform,
         "demonstrations": [demonstration.id for demonstration in demonstrations],
         "participants": sorted({demonstration.participant for demonstration in demonstrations}),
+        **_pooled(analyses, demonstrations),
         "learnt_from": learnt_from,
         "groups": list(by_evidence_group(demonstrations)),
         "reach": None if reach is None else reach_document(reach),
@@ -132,6 +157,14 @@ def reward_document(
         "profiles": [profile_document(one) for one in analyses.profiles],
         "cross_validation": None if analyses.validation is None else validation_document(analyses.validation),
     }
+
+
+def _pooled(analyses: Analyses, demonstrations: Sequence[Demonstration]) -> dict[str, Any]:
+    """Whether there is a reward for each person, and these."""
+    if analyses.population is None:
+        return {"pool": Pool.ALL.value}
+    found = population_document(analyses.population, [one.id for one in demonstrations])
+    return {"pool": Pool.PERSONS.value, "population": found}
 
 
 def _parameters(fit: Fit, expected: FloatArray | None) -> list[dict[str, Any]]:
@@ -184,13 +217,27 @@ def terms_of(document: Mapping[str, Any]) -> tuple[Term, ...]:
     return terms
 
 
-def read_reward(path: Path) -> LearntReward:
-    """A reward of a file.
+def reward_content(path: Path, person: str | None = None) -> dict[str, Any]:
+    """The content of a reward file.
+
+    Args:
+        path: The file.
+        person: One of the people whose rewards it holds, whose reward stands in place of the typical one.
 
     Raises:
-        ArtefactError: As in :func:`read_json`, or the parameters are not those of a reward.
+        ArtefactError: As in :func:`read_json`, or the file holds no reward of this person.
     """
-    return learnt_of(read_json(path, "reward"), str(path))
+    content = read_json(path, "reward")
+    return content if person is None else of_person(content, person, str(path))
+
+
+def read_reward(path: Path, person: str | None = None) -> LearntReward:
+    """A reward of a file; arguments as of :func:`reward_content`.
+
+    Raises:
+        ArtefactError: As in :func:`reward_content`, or the parameters are not those of a reward.
+    """
+    return learnt_of(reward_content(path, person), str(path))
 
 
 def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
@@ -219,10 +266,13 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
         groups=tuple(document["groups"]) if "groups" in document else None,
+        participants=tuple(document["participants"]),
         status=Status(document["status"]),
         profiles=profiles,
         intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),
         search=_search(document.get("search"), len(names), path),
+        persons=tuple(names_of_persons(document)),
+        others=others_of(document, reward, path),
     )
 
 
@@ -242,14 +292,14 @@ def _search(content: Mapping[str, Any] | None, count: int, path: str) -> Search 
     return Search(np.array(nats, dtype=float), np.array(theta, dtype=float))
 
 
-def read_reward_for(path: Path, demonstrations: Sequence[Demonstration]) -> LearntReward:
-    """The reward of a file, for use on demonstrations.
+def read_reward_for(path: Path, demonstrations: Sequence[Demonstration], person: str | None = None) -> LearntReward:
+    """The reward of a file, for use on demonstrations; person as in :func:`reward_content`.
 
     Raises:
         ArtefactError: As in :func:`read_reward`, or the reward was learnt on cells of another size: a reward per step
             means something else where steps have another length.
     """
-    learnt = read_reward(path)
+    learnt = read_reward(path, person)
     check_cells(learnt, demonstrations, str(path))
     return learnt
 

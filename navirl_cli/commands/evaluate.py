@@ -32,7 +32,7 @@ from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import ranks_of
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
 
@@ -118,7 +118,10 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         help="Compare the driven paths of two groups by participant; repeatable.",
     ),
     click.option(
-        "--ranks", is_flag=True, help="Rank each demonstration by likelihood among paths sampled from the policy."
+        "--ranks",
+        is_flag=True,
+        help="Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by "
+        "group, for the groups that the reward was learnt from.",
     ),
 )
 @section(
@@ -169,7 +172,11 @@ def evaluate(
         check_output(output, [demos, *rewards], force=force)
     demonstrations = demonstrations_in(demos)
     groups_named(demonstrations, [name for pair in pairs for name in pair], fields, "pair")  # refuses unknown ones
-    learnt = {path.stem: read_reward_for(path, demonstrations).reward for path in rewards}
+    files = {path.stem: read_reward_for(path, demonstrations) for path in rewards}
+    learnt = {name: one.reward for name, one in files.items()}
+    trained = next(iter(files.values())).trained(demonstrations) if ranks else None
+    if ranks:
+        check_to_rank(demonstrations, trained)
     rng, precision = np.random.default_rng(seed), Precision(samples, error)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
@@ -182,7 +189,9 @@ def evaluate(
             progress=lambda done, _all: update(done, ""),
         )
     compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
-    ranked = ranks_of(demonstrations, next(iter(learnt.values())), samples, rng) if ranks else []
+    ranked = Ranking()
+    if ranks:
+        ranked = ranking(demonstrations, next(iter(learnt.values())), trained, samples, rng)
     inputs = [Input.of(path) for path in (demos, *rewards)]
     document = metrics_document(result, compared, ranked, metrics, inputs, precision, seed)
     text = partial(evaluation_text, result, compared, ranked, metrics)

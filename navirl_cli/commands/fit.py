@@ -30,14 +30,15 @@ from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
-from navirl_cli.irl.analyses import Questions, answers
+from navirl_cli.irl.analyses import Pool, Questions, answers
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
-from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Kind
+from navirl_cli.irl.intervals import ASKED, FEW_DEMONSTRATIONS, Kind
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
@@ -48,9 +49,8 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
         Example(
             "Another reward",
-            "navirl fit demos.json --cycle 2 --terms length,saturating-deviation,personal-space,turn -o reward.json",
+            "navirl fit demos.json --cycle 2 --terms length,deviation,length-space -o reward.json",
         ),
-        Example("A profile likelihood", "navirl fit demos.json --cycle 2 --profile sigma_p -o reward.json"),
     ],
 )
 @demos_argument
@@ -73,6 +73,14 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init it also "
         "gives the initial values.",
     ),
+    click.option(
+        "--pool",
+        type=Choice([pool.value for pool in Pool]),
+        default=Pool.ALL.value,
+        show_default=True,
+        help="One reward for all participants; or a typical one and one for each person, drawn towards the typical one "
+        "as far as the own demonstrations leave it open (random effects on the logarithms of the parameters).",
+    ),
     l2_option,
     click.option(
         "--method",
@@ -92,9 +100,10 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     "Uncertainty",
     click.option(
         "--intervals",
-        type=Choice([kind.value for kind in Kind]),
-        help="95 % intervals from profile likelihoods or from standard errors (wald). Default: profile with fewer than "
-        f"{FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else wald.",
+        type=Choice([kind.value for kind in ASKED]),
+        help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
+        f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
+        "wald; wald with a term of turns, where profiles take minutes.",
     ),
     click.option(
         "--bootstrap",
@@ -124,6 +133,7 @@ def fit(
     terms: tuple[Term, ...],
     initial: str,
     prior_file: Path | None,
+    pool: str,
     l2: float,
     method: str,
     conditions: tuple[str, ...],
@@ -148,7 +158,7 @@ def fit(
     standard errors.
     """
     kind = None if intervals is None else Kind(intervals)
-    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind)
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool))
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
@@ -189,7 +199,7 @@ def fit(
     else:
         echo(to_text(report(document)))
     notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
-    for line in (*notes, *warnings(document, status=False)):
+    for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
         say(line)
     finish(lost)
 

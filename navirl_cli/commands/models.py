@@ -29,8 +29,8 @@ from navirl_cli.reports.models import models_document, models_lost, models_remar
     examples=[
         Example("One condition and cycle", "navirl models demos.json --condition force --cycle 2"),
         Example(
-            "Two models besides the paper's",
-            "navirl models demos.json --cycle 2 --terms length,personal-space --terms length,deviation,length-space",
+            "Another model beside the paper's",
+            "navirl models demos.json --cycle 2 --terms length,deviation,length-space",
         ),
     ],
 )
@@ -59,10 +59,12 @@ def models(
     l2: float,
     as_json: bool,
 ) -> None:
-    """Compare rewards by how well they predict participants from whom they were not learnt.
+    """Compare rewards by how well they predict participants left out.
 
     Each model is fitted to all participants but one and predicts the steps of that one, for each participant in turn.
     """
+    if reach is not None and Steps(steps) is not Steps.REACHABLE:
+        raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
         demonstrations_in(demos),
         conditions=conditions,

@@ -46,7 +46,7 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
 
     from navirl_cli.documents.page import to_html
     from navirl_cli.evaluation.compare import compare
-    from navirl_cli.evaluation.ranks import ranks_of
+    from navirl_cli.evaluation.ranks import ranking
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
@@ -65,7 +65,7 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
             metrics=METRICS,
             progress=lambda done, _all: update(done, ""),
         )
-    ranks = ranks_of(demonstrations, learnt.reward, samples, rng)
+    ranked = ranking(demonstrations, learnt.reward, learnt.trained(demonstrations), samples, rng)
     taught = [one for one in demonstrations if one.id in learnt.demonstrations] or demonstrations
     shown = taught[0], solved(learnt.reward, scenes_of(taught[:1])[0])
     with TemporaryDirectory() as folder:
@@ -74,7 +74,7 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
         )
         made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
         content = report_of(
-            demonstrations, learnt, read_json(reward, "reward"), result, ranks, figures, made_from, seed
+            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, seed
         )
         page = to_html(content)
     with replacing(output, force=force) as temporary:

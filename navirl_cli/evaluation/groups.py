@@ -70,6 +70,16 @@ class Measured(ByContent):
     missing: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Trained:
+    """What a reward was learnt from."""
+
+    #: Ids of demonstrations, names of participants, and evidence groups.
+    ids: frozenset[str]
+    participants: frozenset[str]
+    groups: frozenset[str]
+
+
 def by_group(demonstrations: Iterable[Demonstration], fields: Collection[str] = ()) -> dict[str, list[Demonstration]]:
     """Demonstrations by group: force first, by cycle, then joystick, then autonomous; special sets after the rest."""
     order = list(Condition)

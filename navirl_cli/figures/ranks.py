@@ -1,6 +1,9 @@
 """Ranks of demonstrations among paths of a policy, compared with uniform ranks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,11 +12,14 @@ from matplotlib.lines import Line2D
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.evaluation.ranks import GroupRanks, uniformity
 from navirl_cli.figures.ground import legend_below
-from navirl_cli.figures.style import colour_of, house_style, look
+from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look
 
 #: Opacity of the band.
 _OPACITY = 0.18
+#: Height over width of a panel, and height of its texts, inches.
+_ASPECT, _AROUND_IN = 0.6, 0.85
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class DrawnRanks:
 
 
 @house_style()
-def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.95) -> DrawnRanks:
+def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.95, group: str = "") -> DrawnRanks:
     """Draw the distribution of ranks and the uniform one, which demonstrations from the policy have.
 
     Steps above the diagonal at low ranks are demonstrations that are improbable under the policy. Steps far below it
@@ -43,6 +49,7 @@ def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.9
         ranks: (n,) shares of the policy's paths that are less likely than each demonstration, in [0, 1].
         p_value: Of the Kolmogorov-Smirnov test for uniform ranks.
         level: Probability of the band.
+        group: Of the demonstrations, for the title.
 
     Returns:
         The artists.
@@ -68,8 +75,34 @@ def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.9
     colour, label = colour_of("learnt"), "demonstrations"
     (steps,) = axes.step(x, y, where="post", color=colour, linewidth=1.4, label=label, zorder=3)
     axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="rank among the policy's paths", ylabel="share of demonstrations")
-    axes.set_box_aspect(0.6)
+    axes.set_box_aspect(_ASPECT)
     shown = "p < 0.001" if p_value < 1e-3 else f"p = {p_value:.2g}"
-    axes.set_title(f"n = {count}, {shown} (Kolmogorov-Smirnov)")
+    above = f"{group}\n" if group else ""
+    axes.set_title(f"{above}n = {count}, {shown} (Kolmogorov-Smirnov)")
     legend_below(axes, [steps, uniform, band])
     return DrawnRanks(axes, steps, uniform, band, reach)
+
+
+def rank_layout(panels: int, width_in: float) -> dict[str, Any]:
+    """Panels, columns and height of a figure of ranks, for a number of groups and a width in inches."""
+    columns = 2 if width_in >= PAGE_IN and panels > 1 else 1
+    rows = ceil(panels / columns)
+    # one panel: as high as it needs
+    height_in = None if panels == 1 else rows * (_ASPECT * width_in / columns + _AROUND_IN)
+    return {"panels": panels, "columns": columns, "height_in": height_in}
+
+
+def draw_rank_panels(axes: Sequence[Axes], groups: Sequence[GroupRanks]) -> list[DrawnRanks]:
+    """A panel for each group: conditions are never pooled.
+
+    Args:
+        axes: One for each group.
+        groups: Ranks by group.
+
+    Returns:
+        The artists of each panel.
+    """
+    return [
+        draw_ranks(one, np.array([rank.rank for rank in own.ranks]), uniformity(own.ranks)[1], group=own.name)
+        for one, own in zip(axes, groups, strict=True)
+    ]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import ArgumentError, NavirlError
@@ -12,6 +13,7 @@ from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.intervals import Intervals, Kind, default_kind, intervals
+from navirl_cli.irl.population import Population, population
 from navirl_cli.irl.profile import Profile, number_of, profile
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
@@ -22,6 +24,15 @@ from navirl_cli.irl.validation import Validation, cross_validate
 Update = Callable[[int, str], None]
 #: Opens a progress bar: a label, and the number of steps where it is known.
 Bars = Callable[[str, int | None], AbstractContextManager[Update]]
+
+
+class Pool(StrEnum):
+    """What the reward is of."""
+
+    #: One for everyone.
+    ALL = "all"
+    #: A typical one, and one for each participant.
+    PERSONS = "persons"
 
 
 @dataclass(frozen=True)
@@ -40,6 +51,8 @@ class Questions:
     seed: int = 0
     #: How intervals are computed; None: by the number of demonstrations.
     intervals: Kind | None = None
+    #: Whether all people have one reward.
+    pool: Pool = Pool.ALL
 
     def check_arguments(self, steps: Steps, *, prior: bool, l2: float) -> None:
         """Refuse requests that no data can answer, before anything is read.
@@ -47,6 +60,11 @@ class Questions:
         Raises:
             ArgumentError: The analyses exclude each other, the prior, the steps or the regulariser.
         """
+        if self.pool is Pool.PERSONS and (prior or self._of_one_reward):
+            raise ArgumentError(
+                "`pool` persons has its own intervals and errors, and no prior: leave out `prior`, `correct_bias`, "
+                "`intervals`, `bootstrap`, `profile` and `cross_validate`"
+            )
         if self.cross_validate and prior:
             raise ArgumentError(
                 "`cross_validate` and `prior` exclude each other: the prior may know the participant who is left out"
@@ -63,6 +81,12 @@ class Questions:
                 f"`correct_bias` corrects maximum likelihood: expected `l2` <= {PAPER_L2:g}, found {l2:g}"
             )
 
+    @property
+    def _of_one_reward(self) -> bool:
+        """Whether something is asked that only a fit of one reward for all can answer."""
+        asked = self.correct_bias or self.bootstrap or self.profiles or self.cross_validate
+        return bool(asked) or self.intervals is not None
+
     def check(self, evidence: Evidence, start: Reward) -> None:
         """Refuse requests that these data cannot answer, before the fit.
 
@@ -72,7 +96,11 @@ class Questions:
         """
         for name in self.profiles:
             number_of(start, name)
-        for name, asked in (("bootstrap", self.bootstrap), ("cross_validate", self.cross_validate)):
+        for name, asked in (
+            ("pool", self.pool is Pool.PERSONS),
+            ("bootstrap", self.bootstrap),
+            ("cross_validate", self.cross_validate),
+        ):
             if asked:
                 evidence.several_people(name)
 
@@ -88,6 +116,8 @@ class Analyses(ByContent):
     bootstrap: Bootstrap | None = None
     profiles: tuple[Profile, ...] = ()
     validation: Validation | None = None
+    #: The people, for a typical reward and one for each.
+    population: Population | None = None
 
 
 def no_bars(_label: str, _length: int | None = None) -> AbstractContextManager[Update]:
@@ -118,6 +148,8 @@ def answers(
         The fit, corrected if requested; the results; and the errors of analyses that failed. A failed analysis does not
         affect the fit.
     """
+    if questions.pool is Pool.PERSONS:
+        return _persons(evidence, found, executor, bars)
     lost: list[str] = []
     drawn = validation = None
     followed = []
@@ -140,6 +172,18 @@ def answers(
         with _kept(lost), bars("cross-validation", len(evidence.people)) as update:
             validation = cross_validate(evidence, found.initial, found.l2, executor=executor, progress=update)
     return found, Analyses(measured, bias, drawn, tuple(followed), validation), lost
+
+
+def _persons(evidence: Evidence, pooled: Fit, executor: Executor | None, bars: Bars) -> tuple[Fit, Analyses, list[str]]:
+    """The typical reward in place of the pooled one, and the people; results as of :func:`answers`."""
+    with bars("persons", None) as update:
+        found, people, ends = population(
+            evidence,
+            pooled,
+            executor=executor,
+            progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
+        )
+    return found, Analyses((ends,), population=people), []
 
 
 def _measured(

@@ -6,7 +6,7 @@ followed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +62,11 @@ class Effort:
     """When a search ends."""
 
     #: Largest number of steps.
-    most: int = MAX_ITERATIONS
+    most: int = field(default_factory=lambda: MAX_ITERATIONS)
     #: A predicted gain below which it has converged, nats.
     enough: float = GAIN_TOLERANCE
+    #: Whether it begins with long strides, as in a climb after a step along a ridge that is often flat.
+    strides: bool = False
 
 
 def maximise(
@@ -75,7 +77,7 @@ def maximise(
     progress: Callable[[float], None] | None = None,
     known: Sequence[Point] = (),
     hope: float | None = None,
-    effort: Effort = Effort(),
+    effort: Effort | None = None,
 ) -> Maximum:
     """Climb to a local maximum.
 
@@ -88,14 +90,15 @@ def maximise(
         known: Maxima found before. The search ends early where it is converging to one of them.
         hope: The value of interest, for a concave objective. The search ends early where it cannot be reached, or to
             within a coarse tolerance.
-        effort: When the search ends.
+        effort: When the search ends; the default is :class:`Effort`.
 
     Returns:
         The maximum and the accepted places before it.
     """
     lower, upper = bounds
+    effort = effort or Effort()
     here, path, radius = start, [start], FIRST_RADIUS if not known and hope is None else AGAIN_RADIUS
-    if hope is not None:
+    if hope is not None or effort.strides:
         radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
     while len(path) <= effort.most and radius > MIN_RADIUS:

@@ -14,8 +14,9 @@ from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import METRICS, Metric
 from navirl_cli.evaluation.paired import FEWEST, Paired
-from navirl_cli.evaluation.ranks import Rank, uniformity
+from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.files import replacing
+from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 
 #: More metrics are written below each other.
 MOST_COLUMNS = 6
@@ -31,14 +32,18 @@ def metrics_table() -> Table:
 
 
 def evaluation_text(
-    result: Comparison, pairs: Pairs, ranks: Sequence[Rank], metrics: Sequence[Metric], how: Format
+    result: Comparison,
+    pairs: Pairs,
+    ranked: Ranking,
+    metrics: Sequence[Metric],
+    how: Format,
 ) -> str:
     """Everything in one format.
 
     Args:
         result: Metrics by group.
         pairs: Comparisons of groups.
-        ranks: Of demonstrations.
+        ranked: Ranks of demonstrations.
         metrics: That were asked for.
         how: The format; CSV holds the groups only, with one number a column.
     """
@@ -49,13 +54,14 @@ def evaluation_text(
         *(_side_by_side(result, metrics) if wide else _below_each_other(result, metrics)),
         *([_intervals(result, metrics)] if wide else []),
         *(_paired(one, other, found, metrics) for one, other, found in pairs),
-        *([_ranks(ranks)] if ranks else []),
+        *([group_ranks_table(ranked.ranks), rank_table(ranked.ranks)] if ranked.ranks else []),
     ]
     parts = [written(table, how) for table in tables if table is not None]
     left_out = _gathered((result.missing[m.name], m.label) for m in metrics if m.name in result.missing)
     missing = "\n".join(f"Left out: {', '.join(labels)}: {reason}." for reason, labels in left_out.items())
     legend = "\n".join(_legend(result, metrics)) if how is Format.TEXT else ""
-    return "\n\n".join(filter(None, [*parts, missing, legend]))
+    said = "\n".join(f"{line[0].upper()}{line[1:]}." for line in rank_lines(ranked))
+    return "\n\n".join(filter(None, [*parts, said, missing, legend]))
 
 
 def write_evaluation(
@@ -249,27 +255,6 @@ def _paired_note(known: Sequence[tuple[Metric, Paired]], metrics: Sequence[Metri
     if lacking:
         notes.append(f"No participant has driven paths of both groups with a value of: {', '.join(lacking)}.")
     return " ".join(notes)
-
-
-def uniform_line(ranks: Sequence[Rank]) -> str:
-    """How well the ranks agree with a calibrated model, in a line."""
-    statistic, p_value = uniformity(ranks)
-    return (
-        f"ranks of {len(ranks)} demonstrations among the policy's paths; a calibrated model gives uniform ranks: "
-        f"Kolmogorov-Smirnov D = {statistic:.3f}, p = {p_value:.3g}"
-    )
-
-
-def _ranks(ranks: Sequence[Rank]) -> Table:
-    """Rank by demonstration."""
-    columns = (
-        Column("demonstration"),
-        Column("group"),
-        Column("log_likelihood", "log-likelihood", DECIMALS),
-        Column("rank", decimals=DECIMALS),
-    )
-    rows = tuple((one.id, one.group, one.log_likelihood, one.rank) for one in ranks)
-    return Table(columns, rows, uniform_line(ranks))
 
 
 def _legend(result: Comparison, metrics: Sequence[Metric]) -> list[str]:

@@ -19,6 +19,7 @@ from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
 from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
+from navirl_cli.reports.persons import person_blocks, person_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -32,6 +33,10 @@ _OF = {
     "model": "from the likelihood",
 }
 _BY = {"profile": "profile likelihood", "wald": "standard errors"}
+_PERSONS = {
+    "participant": "random effects over {count} participants, of the typical person",
+    "model": "random effects over participants, of this person",
+}
 
 
 def report(content: Mapping[str, Any]) -> list[Block]:
@@ -45,6 +50,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
         Paragraph(f"Status: **{status.value}**: {status.advice}."),
         parameter_table(content),
         *interval_notes(content),
+        *person_blocks(content),
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
@@ -125,8 +131,10 @@ def interval_notes(content: Mapping[str, Any]) -> list[Block]:
     if not sets:
         return []
     count = len(content["participants"])
-    method = _BY[sets[0]["method"]]
-    text = f"95 % intervals: {method}, {_OF[sets[0]['errors']].format(freedom=count - 1)}"
+    if sets[0]["method"] == "posterior":
+        text = f"95 % intervals: {_PERSONS[sets[0]['errors']].format(count=count)}"
+    else:
+        text = f"95 % intervals: {_BY[sets[0]['method']]}, {_OF[sets[0]['errors']].format(freedom=count - 1)}"
     if len(sets) > 1:
         text += "; as if one person: the same for paths of one policy"
     rough = approximate(content)
@@ -137,6 +145,8 @@ def approximate(content: Mapping[str, Any]) -> str:
     """Why the intervals in front are approximate. Empty where simulations found 92 to 98 % of them right."""
     sets = content.get("intervals", [])
     count = len(content["participants"])
+    if sets and sets[0]["method"] == "posterior":
+        return f"Approximate: {count} participants say little about how people differ." if 1 < count < FEW else ""
     if sets and sets[0]["errors"] == "participant" and count < FEW:
         return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
     if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
@@ -381,6 +391,7 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
         ]
     lines += _bias_warnings(parameters)
     lines += reach_warnings(content)
+    lines += person_warnings(content)
     count = len(content["participants"])
     if 1 < count < FEW:
         lines.append(

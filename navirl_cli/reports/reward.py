@@ -1,7 +1,7 @@
 """The page of ``navirl report``."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,10 @@ from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
-from navirl_cli.evaluation.ranks import Rank
-from navirl_cli.reports.evaluation import group_table, uniform_line
+from navirl_cli.evaluation.ranks import Ranking
+from navirl_cli.planning.problem import problem_of
+from navirl_cli.reports.evaluation import group_table
+from navirl_cli.reports.evidence import evidence_remarks, reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
@@ -32,6 +34,9 @@ from navirl_cli.reports.fit import (
     validation_tables,
     warnings,
 )
+from navirl_cli.reports.persons import person_blocks
+from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
+from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
 
 _CAPTIONS = {
@@ -41,9 +46,9 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: The metrics of the paper and two more.
+#: A lower end this many times smaller than a positive quantity does not bound it.
+NOTHING = 1e-3
 METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
-#: Rank below which a demonstration is reported as rare.
-_RARE = 0.01
 
 
 def report_of(
@@ -51,7 +56,7 @@ def report_of(
     learnt: LearntReward,
     content: Mapping[str, Any],
     result: Comparison,
-    ranks: Sequence[Rank],
+    ranked: Ranking,
     figures: Mapping[str, Path],
     made_from: Sequence[Mapping[str, str]],
     seed: int,
@@ -63,7 +68,7 @@ def report_of(
         learnt: The reward.
         content: Of its file.
         result: Metrics.
-        ranks: Of the demonstrations among the policy's paths.
+        ranked: Ranks of the demonstrations among the policy's paths.
         figures: Files by name.
         made_from: Files and hashes.
         seed: Of the intervals.
@@ -71,17 +76,20 @@ def report_of(
     notes = repeated(demonstrations)
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
-        *_warnings(content, ranks),
+        *_recommendation(demonstrations, learnt, seed),
+        *_warnings(demonstrations, learnt, content, ranked),
         Heading("Parameters"),
         formula(learnt.reward.terms),
         parameter_table(content),
         *interval_notes(content),
+        *person_blocks(content),
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
         *_pictures(figures, "profile"),
         *correlation_table(content),
         likelihood_table(content),
+        *reach_line(content),
         *_meanings(demonstrations, learnt, seed),
         Heading("Learnt policy"),
         *_pictures(figures, "policy"),
@@ -89,8 +97,7 @@ def report_of(
         group_table(result.groups, METRICS, "Mean ± standard deviation."),
         *_pictures(figures, "properties", "paths"),
         Heading("Ranks of the demonstrations"),
-        Paragraph(f"R{uniform_line(ranks)[1:]}. Demonstrations that the reward was learnt from are included."),
-        _rank_table(learnt, ranks),
+        *_rank_blocks(learnt, ranked),
         Heading("Prediction of participants left out"),
         *(validation_tables(content) or [Paragraph("Not computed; fit with `cross_validate` participant.")]),
         Heading("Trials"),
@@ -100,6 +107,12 @@ def report_of(
         Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
+
+
+def _recommendation(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Block]:
+    """How to drive by the reward, on open ground and in the scene of the first demonstration that it is from."""
+    shown = next((one for one in demonstrations if one.id in learnt.demonstrations), demonstrations[0])
+    return recommendation_blocks(learnt, problem_of(shown), shown.id, seed)
 
 
 def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any]) -> str:
@@ -132,36 +145,40 @@ def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
     interval = ""
     if isfinite(one.lower) or isfinite(one.upper):
-        interval = f" ({_range(one.lower, one.upper)})"
+        interval = f" ({in_words(one.lower, one.upper, one.value)})"
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
-def _range(lower: float, upper: float) -> str:
-    """An interval in words; an open end is infinite."""
+def in_words(lower: float, upper: float, value: float) -> str:
+    """An interval in words; an open end is infinite, and one far below the value is none."""
+    if 0 <= lower < NOTHING * value:
+        lower = -inf
+    if not (isfinite(lower) or isfinite(upper)):
+        return "the demonstrations set no range"
     if not isfinite(lower):
         return f"less than {upper:.3g}"
     return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
 
 
-def _rank_table(learnt: LearntReward, ranks: Sequence[Rank]) -> Table:
-    """One row for each demonstration."""
-    columns = (
-        Column("demonstration"),
-        Column("group"),
-        Column("log_likelihood", "log-likelihood nats", decimals=2),
-        Column("rank", decimals=3),
-        Column("learnt_from", "learnt from"),
-    )
-    rows = tuple((one.id, one.group, one.log_likelihood, one.rank, one.id in learnt.demonstrations) for one in ranks)
-    return Table(columns, rows, note="Rank: share of the policy's paths that are less likely than the demonstration.")
+def _rank_blocks(learnt: LearntReward, ranked: Ranking) -> list[Block]:
+    """Ranks by group and by demonstration, and which demonstrations fit badly."""
+    lines = tuple(f"{line[0].upper()}{line[1:]}." for line in rank_lines(ranked))
+    if not ranked.ranks:
+        return [Paragraph(lines[0])]
+    tables = [group_ranks_table(ranked.ranks), rank_table(ranked.ranks, learnt.demonstrations)]
+    return [*tables, *([Bullets(lines)] if lines else [])]
 
 
-def _warnings(content: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
+def _warnings(
+    demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any], ranked: Ranking
+) -> list[Block]:
     """What a reader should know before trusting the numbers."""
-    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in warnings(content)]
-    rare = ", ".join(one.id for one in ranks if one.rank < _RARE)
-    if rare:
-        lines.append(f"The policy rarely takes paths like those of {rare}.")
+    taught = [one for one in demonstrations if one.id in learnt.demonstrations]
+    said = [*evidence_remarks(taught, demonstrations), *warnings(content)]
+    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in said]
+    bad = ", ".join(one.id for one in ranked.bad)
+    if bad:
+        lines.append(f"The policy rarely takes paths like those of {bad}; see the ranks.")
     return [Heading("Warnings"), Bullets(tuple(lines))] if lines else []
 
 

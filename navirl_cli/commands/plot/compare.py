@@ -9,7 +9,7 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands import completion
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, Function, section
 
@@ -31,33 +31,46 @@ def _group_option(count: str) -> Callable[[Function], Function]:
 @click.command(
     cls=Command,
     examples=[
-        Example("All demonstrations", "navirl plot ranks demos.json --reward reward.json -o ranks.pdf"),
+        Example(
+            "Demonstrations like those learnt from", "navirl plot ranks demos.json --reward reward.json -o ranks.pdf"
+        ),
         Example("One group", "navirl plot ranks demos.json --reward reward.json --group 'force, cycle 2' -o ranks.png"),
     ],
 )
 @page_options
 @demos_argument
-@section("Demonstrations", _group_option("repeatable; all by default"))
+@section("Demonstrations", _group_option("repeatable; by default the groups that the reward was learnt from"))
 @section("Learnt paths", reward_option, samples_option(), seed_option)
 def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
     """Draw how demonstrations rank among paths of the policy.
 
-    Ranks are by log-likelihood. They are uniform if the policy is right.
+    Ranks are by log-likelihood, with a panel for each group. They are uniform if the policy is right.
     """
     import numpy as np
 
     from navirl_cli.evaluation.groups import groups_named
-    from navirl_cli.evaluation.ranks import ranks_of, uniformity
-    from navirl_cli.figures.ranks import draw_ranks
+    from navirl_cli.evaluation.ranks import Ranking, by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
+    from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
+    from navirl_cli.reports.ranks import rank_lines
 
     demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations).reward
-    chosen = [one for own in groups_named(demonstrations, groups) for one in own] if groups else demonstrations
+    learnt = read_reward_for(reward, demonstrations)
+    trained = learnt.trained(demonstrations)
+    others: dict[str, int] = {}
+    if groups:
+        chosen = [one for own in groups_named(demonstrations, groups) for one in own]
+    else:
+        check_to_rank(demonstrations, trained)
+        chosen, others = chosen_to_rank(demonstrations, trained)
+    rng = np.random.default_rng(seed)
     with progress_bar("rank", len(chosen)) as update:
         found = ranks_of(
-            chosen, learnt, samples, np.random.default_rng(seed), progress=lambda done, _all: update(done, "")
+            chosen, learnt.reward, samples, rng, progress=lambda done, _all: update(done, ""), trained=trained
         )
-    page.draw(lambda axes: draw_ranks(axes[0], np.array([one.rank for one in found]), uniformity(found)[1]))
+    panels = by_group_and_training(found)
+    page.draw(lambda axes: draw_rank_panels(axes, panels), **rank_layout(len(panels), page.width_in))
+    for line in rank_lines(Ranking(tuple(found), others, trained)):
+        say(line)
 
 
 @click.command(

@@ -5,6 +5,7 @@ Source: the MCAP file format specification, https://mcap.dev/spec. Of each recor
 
 import struct
 from array import array
+from collections.abc import MutableSequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -256,7 +257,7 @@ class FoundRecords:
     """The records that a walk over a buffer found."""
 
     #: Offsets of the message records, by channel id, ascending.
-    messages: "dict[int, array[int]]"
+    messages: dict[int, MutableSequence[int]]
     #: Of each schema and channel record: its code, first byte of its contents, first byte after them.
     definitions: list[tuple[int, int, int]]
     #: Where the walk stopped: at the end of the buffer, at a record that is cut, or at one of another type.
@@ -274,7 +275,7 @@ def walk(data: bytes | memoryview, limit: int, at: int = 0) -> FoundRecords:
     Returns:
         The records; `stop` is smaller than `limit` if a record is cut or of another type.
     """
-    messages: dict[int, array[int]] = {}
+    messages: dict[int, MutableSequence[int]] = {}
     definitions: list[tuple[int, int, int]] = []
     unpack = _MESSAGE_START.unpack_from
     last = limit - HEAD_SIZE
