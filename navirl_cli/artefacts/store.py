@@ -129,7 +129,11 @@ def _parsed(text: str) -> Any:
     """
     document = json.loads(text, parse_constant=_refuse_constant)
     if _SURROGATE.search(text):
-        json.dumps(document, ensure_ascii=False).encode("utf-8")
+        try:
+            json.dumps(document, ensure_ascii=False).encode("utf-8")
+        except UnicodeEncodeError as error:
+            half = ascii(error.object[error.start])[1:-1]
+            raise ValueError(f"{half}, half of a surrogate pair, which no text has; write the file again") from error
     return document
 
 
