@@ -22,7 +22,7 @@ ORDERS = {
         ["artefacts", "export"],
         ["reports"],
         ["figures"],
-        ["api"],
+        ["api", "watching"],
         ["commands"],
         ["cli"],
         ["__main__"],

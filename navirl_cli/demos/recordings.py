@@ -111,6 +111,13 @@ def extract_recordings(
     )
 
 
+def extract_one(
+    source: Source, settings: ExtractSettings, options: LoadOptions
+) -> tuple[tuple[Input, ...], Extraction] | NavirlError:
+    """The files and demonstrations of one recording among others, or the reason why it gave none."""
+    return _extracted((source, ()), settings, options, None, alone=False)
+
+
 def _rows(
     labels: Labels | None, sources: Sequence[Source], settings: ExtractSettings
 ) -> tuple[list[tuple[Label, ...]], list[str]]:
