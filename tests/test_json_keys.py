@@ -13,7 +13,7 @@ from navirl_cli.irl.terms import TERMS
 
 #: Artefacts of version 1 and those that came later.
 FIRST = ("demonstrations", "reward", "metrics", "study")
-KINDS = (*FIRST, "plan")
+KINDS = (*FIRST, "plan", "manifest")
 ROOT = Path(__file__).parent.parent
 UNITS = ("s", "hz", "m", "m2", "m_s", "m_s2", "m_s3", "1_m", "rad", "n", "n_s", "m_s_n", "j", "share", "bytes")
 #: Counts, numbers of order, statistics without a unit.

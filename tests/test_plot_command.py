@@ -236,9 +236,9 @@ def test_options_that_would_change_nothing_are_refused(navirl, files):
     learnt = (files / "demos.json", "--reward", files / "reward.json", "-o", "a.png")
     for option in ("--samples", "--seed"):
         answer = navirl("plot", "policy", *learnt, "--overlay", "demos", option, "3", code=2).stderr
-        assert f"Error: {option} changes nothing without --overlay samples; add that, or leave out {option}." in answer
+        assert f"Error: {option} goes with --overlay samples." in answer
         answer = navirl("plot", "properties", files / "demos.json", "-o", "a.png", option, "3", code=2).stderr
-        assert f"Error: {option} changes nothing without --reward; add that, or leave out {option}." in answer
+        assert f"Error: {option} goes with --reward." in answer
 
 
 def test_properties_can_be_bars_and_letters_those_of_ieee(files, figure_of):

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
 
-from navirl_cli.api.arguments import one_of, texts, within
+from navirl_cli.api.arguments import one_of, subset_in, texts, within
 from navirl_cli.api.calls import policy as policy_in
 from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, reward_in
 from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, ArtefactError
+from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import group_of, groups_named
+from navirl_cli.evaluation.groups import Trained, group_of, groups_named
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.actions import draw_actions
@@ -29,7 +30,7 @@ from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, like
 from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.overlay import alike, overlays_of
+from navirl_cli.figures.overlay import driven, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
@@ -62,6 +63,11 @@ class PageOptions(TypedDict, total=False):
 def paths(
     demos: PathLike | Sequence[Demonstration],
     *,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
     axes: "Axes | None" = None,
     crop: bool = False,
     together: bool = False,
@@ -71,6 +77,12 @@ def paths(
 
     Args:
         demos: Demonstrations, or their file.
+        condition: Only trials of these conditions, as of :func:`navirl_cli.fit`; so are cycle, set, participant and
+            trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the paths.
         together: One map for all groups, also with more than 40 paths and without `axes`.
@@ -82,7 +94,7 @@ def paths(
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
+    demonstrations = subset_in(condition, cycle, set, participant, trial).of(demonstrations_in(demos))
     groups = [] if together or axes is not None else panels_of(demonstrations)
     if groups:
         shape = {"panels": len(groups), "columns": 2}
@@ -109,11 +121,11 @@ def policy(
         demonstration: Gives the map, the people, the start and the goal.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the likely paths.
-        overlay: Draw paths over the map: "demos", "samples", or both.
+        overlay: Draw paths over the map: "demos" (in this scene by this participant), "all" (all of demos on this
+            map), "samples"; one or several.
         samples: Number of paths sampled from the policy.
         seed: The same seed gives the same paths.
-        demos: Demonstrations for the overlay; those in the same scene are drawn. By default the given demonstration
-            alone.
+        demos: Demonstrations for the overlay. By default the given demonstration alone.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -196,6 +208,12 @@ def properties(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward | None = None,
     *,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     samples: int = 100,
     seed: int = 0,
     bars: bool = False,
@@ -206,6 +224,12 @@ def properties(
     Args:
         demos: Demonstrations, or their file.
         reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials. By default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
         bars: Bars from 0 with standard deviations, in place of points.
@@ -217,7 +241,10 @@ def properties(
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
+    everyone = demonstrations_in(demos)
+    trained = [] if reward is None else [_trained(reward, everyone)]
+    subset = subset_in(condition, cycle, set, participant, trial)
+    demonstrations = choose(everyone, subset, trained, everything=all).demonstrations
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
@@ -249,6 +276,12 @@ def ranks(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward,
     *,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     group: str | Sequence[str] = (),
     samples: int = 1000,
     seed: int = 0,
@@ -259,6 +292,12 @@ def ranks(
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
+        condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials, also of groups that the reward was not learnt from.
         group: Groups to rank; by default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
@@ -271,12 +310,13 @@ def ranks(
         NavirlError: A scene has no policy under the reward, no demonstration is like those that it was learnt from, or
             the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
-    parameters = reward_in(reward, demonstrations)
-    known = isinstance(reward, str | Path | LearntReward)
-    trained = learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]
+    everyone, subset = demonstrations_in(demos), subset_in(condition, cycle, set, participant, trial)
+    parameters, trained = reward_in(reward, everyone), _trained(reward, everyone)
+    demonstrations = choose(everyone, subset, everything=all).demonstrations
     if names := texts(group):
         chosen = [one for own in groups_named(demonstrations, names) for one in own]
+    elif subset.names or all:
+        chosen = list(demonstrations)
     else:
         check_to_rank(demonstrations, trained)
         chosen, _ = chosen_to_rank(demonstrations, trained)
@@ -389,14 +429,20 @@ def _cells(
     demos: Sequence[Demonstration],
 ) -> CellOptions:
     """Common options of all figures of a scene; cropped figures have the same view."""
-    wanted = {one_of(("demos", "samples"), one, "overlay") for one in texts(overlay)}
-    overlays = overlays_of(
-        alike(demos or [view.demonstration], view.demonstration) if "demos" in wanted else (),
-        view.sample(samples, seed=seed) if "samples" in wanted else (),
-    )
+    wanted = {one_of(("demos", "all", "samples"), one, "overlay") for one in texts(overlay)}
+    shown: Sequence[Demonstration] = ()
+    if wanted & {"demos", "all"}:
+        shown, _ = driven(demos or [view.demonstration], view.demonstration, everywhere="all" in wanted)
+    overlays = overlays_of(shown, view.sample(samples, seed=seed) if "samples" in wanted else ())
     lines = [line for one in overlays for line in one.lines_m]
     window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
     return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}
+
+
+def _trained(reward: PathLike | AnyReward, demonstrations: Sequence[Demonstration]) -> Trained | None:
+    """What a reward was learnt from; None where that is unknown."""
+    known = isinstance(reward, str | Path | LearntReward)
+    return learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]
 
 
 def _taught(reward: PathLike | AnyReward | None, demonstrations: Sequence[Demonstration]) -> set[str]:

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.shared import check_output, force_option, output_option, say
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
 
 if TYPE_CHECKING:
+    from navirl_cli.artefacts.rewards import LearntReward
     from navirl_cli.demos.demonstration import Demonstration
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is imported only to draw a figure.
@@ -114,7 +116,7 @@ def page_options(function: Function) -> Function:
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
 trial_option = click.option(
-    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first]"
+    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first chosen]"
 )
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
 
@@ -129,3 +131,20 @@ def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "D
         if trial in {None, one.id}:
             return one
     raise DemonstrationError(unknown("`trial`", trial, [one.id for one in demonstrations]))
+
+
+def scene_of(
+    choosing: Choosing,
+    demonstrations: Sequence["Demonstration"],
+    rewards: Sequence["LearntReward"],
+    trial: str | None,
+) -> tuple["Demonstration", list["Demonstration"]]:
+    """The trial whose scene is drawn, and the chosen demonstrations; by default the first of these.
+
+    Raises:
+        NavirlError: A name is unknown.
+    """
+    if trial is None:
+        return choosing.scene_of(demonstrations, rewards)
+    one = trial_of(choosing.subset.of(demonstrations), trial)
+    return one, choosing.of(demonstrations, rewards, quiet=True)
