@@ -123,7 +123,7 @@ def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(valu
     (robot,) = [patch for patch in drawn.axes.patches if patch not in {person, *filled}]
     assert person.get_linewidth() >= 2 * robot.get_linewidth()  # so that the two are not taken for each other
     entries = dict(zip(legend_texts(drawn.axes), drawn.axes.get_legend().legend_handles, strict=True))
-    assert entries["person"].get_markerfacecolor() == "none"
+    assert entries["person"].get_markerfacecolor() == ("#F0E442" if filled else "none")
     assert entries["person"].get_markeredgewidth() == person.get_linewidth()
 
 

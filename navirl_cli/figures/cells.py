@@ -60,7 +60,7 @@ class CellOptions(TypedDict, total=False):
     title: str
     #: Whether to put a legend below; default True.
     legend: bool
-    #: Whether people hide the colours below them; default False.
+    #: Whether people hide the colours below them; by default those of the policy where no visits are.
     opaque_people: bool
 
 
@@ -109,7 +109,7 @@ def draw_policy(axes: Axes, scene: Scene, visits: FloatArray, **options: Unpack[
     inside_people = np.zeros(len(visits), dtype=bool)
     for person in scene.people_m:
         inside_people |= np.hypot(*(scene.lattice.xy_m - person).T) < PERSON_RADIUS_M
-    options["opaque_people"] = not (visits[inside_people] >= LEAST_VISITS).any()
+    options.setdefault("opaque_people", not (visits[inside_people] >= LEAST_VISITS).any())
     return draw_scene(image, bar, scene, window, **options)
 
 
