@@ -2,6 +2,10 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +13,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from navirl_cli.artefacts.plans import read_plan
+from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.artefacts.plans import read_line, read_plan
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
 from navirl_cli.demos.extract import ExtractSettings
@@ -22,6 +27,7 @@ from navirl_cli.planning import certainty
 from navirl_cli.planning.certainty import Certainty, another_pass
 from navirl_cli.planning.recommendation import Quantity
 from navirl_cli.reports.watch import learnt_line
+from navirl_cli.simulation.log import write_log
 from navirl_cli.watching import loop
 from navirl_cli.watching.folder import PAUSE_S, SHARE, Folder, pause_s
 from navirl_cli.watching.learning import next_trials
@@ -241,12 +247,18 @@ def watch(folder, *words, code=0):
     return done
 
 
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
 @pytest.mark.usefixtures("quick")
 def test_from_a_recording_to_reward_paths_and_figure_and_on_from_there(tmp_path):
     (tmp_path / "logs").mkdir()
-    watch(tmp_path)
-    assert not (tmp_path / "visit" / "reward.json").exists()
     shutil.copy(SAMPLES[0], tmp_path / "logs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "write_reward", interrupted)
+        assert watch(tmp_path, code=130).stderr == "navirl: interrupted\n"
+    assert not (tmp_path / "visit" / "reward.json").exists()
     (line,) = watch(tmp_path).stdout.splitlines()
     assert line.startswith("4 demonstrations of 1 recording: pass people at 0.")
     visit = tmp_path / "visit"
@@ -270,3 +282,68 @@ def test_the_earlier_reward_is_no_output(tmp_path):
     (tmp_path / "visit").mkdir()
     (tmp_path / "visit" / "reward.json").write_text("{}")
     assert "expected another file than the input" in watch(tmp_path, "--reward", "visit/reward.json", code=2).stderr
+
+
+def waited(condition, what, seconds=120):
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.02)
+
+
+def hash_of(visit):
+    reward = visit / "reward.json"
+    return reward.read_bytes() if reward.exists() else b""
+
+
+@pytest.mark.slow
+def test_a_visit_of_two_cycles_that_is_killed_in_the_middle(tmp_path):
+    """The second cycle drives the path that the first one taught; nothing is lost, and nothing counts twice."""
+    visit, logs = tmp_path / "visit", tmp_path / "logs"
+    logs.mkdir()
+    words = [sys.executable, "-m", "navirl_cli", "watch", "logs", "--condition", "force", "-o", "visit"]
+
+    def start():
+        return subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    first = start()
+    write_log(1, 3, logs / "first.mcap", force=False)
+    waited(lambda: any((visit / "recordings").glob("*.json")), "no recording counts")
+    first.kill()
+    first.communicate()
+    second = start()
+    waited(lambda: read_intervals(visit), "the first cycle is not learnt")
+    learnt = hash_of(visit)
+    write_log(1, 3, logs / "second.mcap", driven_m=read_line(visit / "path_3.csv"), force=False)
+    waited(lambda: hash_of(visit) != learnt and read_intervals(visit), "the second cycle is not learnt")
+    second.send_signal(signal.SIGINT)
+    stdout, stderr = second.communicate(timeout=60)
+    assert second.returncode == 130
+    assert stderr.endswith("navirl: interrupted\n")
+    one, two = stdout.splitlines()
+    assert one.startswith("4 demonstrations of 1 recording: ")
+    assert two.startswith("6 demonstrations of 2 recordings: ")
+    assert sorted(path.name for path in visit.iterdir() if path.name.startswith(".")) == []
+    # as without a kill, and as by hand
+    watch(tmp_path, "-o", "other")
+    CliRunner().invoke(
+        cli, ["fit", str(visit / "demos.json"), "--condition", "force", "-o", str(tmp_path / "hand.json")]
+    )
+    own, other, hand = (
+        read_reward(path).reward.theta
+        for path in (visit / "reward.json", tmp_path / "other" / "reward.json", tmp_path / "hand.json")
+    )
+    assert own == other == hand
+    # the second cycle drove where it was planned, so that the person had less to correct
+    impulses = {
+        one.id: sum(np.hypot(*contact.impulse_n_s) for contact in one.contacts)
+        for one in read_demonstrations(visit / "demos.json")
+    }
+    assert max(impulses["p01/8"], impulses["p01/9"]) < min(impulses["p01/1"], impulses["p01/2"])
+
+
+def read_intervals(visit):
+    """The intervals of a visit's reward, which the confirmed fit has."""
+    reward = visit / "reward.json"
+    return read_reward(reward).intervals if reward.exists() else ()
