@@ -62,6 +62,8 @@ def folder(tmp_path_factory):
             [*fit, "--profile", "sigma_p", "-o", "reward.json"],
             [*fit, "-o", "first.json"],
             [*fit, "--only-corrected", "-o", "second.json"],
+            ["select", "demos.json", "--participant", "p01", "-o", "monday.json"],
+            ["select", "demos.json", "--participant", "p02", "-o", "tuesday.json"],
         ):
             result = CliRunner().invoke(cli, words)
             assert result.exit_code == 0, result.output

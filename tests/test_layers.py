@@ -13,7 +13,7 @@ ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
         ["files", "parallel"],
-        ["documents"],
+        ["documents", "cluster"],
         ["logs"],
         ["demos"],
         ["irl"],

@@ -51,8 +51,8 @@ from navirl_cli.documents.tables import written
         default=0.0,
         show_default=True,
         type=Number(0, 1000),
-        help="People start to intervene only where the robot's path displeases them by more than this: the logarithm "
-        "of how much rarer paths of their own reward pass there than beside it, nats.",
+        help="People start to intervene only where the robot's path displeases them by more than this, nats: the "
+        "logarithm of how many times more often a policy of their own reward visits the best place beside them.",
     ),
     click.option("--delay", default=0.25, show_default=True, type=Number(0, 5), help="Reaction time, s."),
     click.option(

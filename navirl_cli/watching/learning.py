@@ -16,6 +16,7 @@ from navirl_cli.artefacts.plans import Planned, plan_document, write_plan
 from navirl_cli.artefacts.rewards import LearntReward, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.subset import Subset
 from navirl_cli.evaluation.reach import ReachEffect, reach_effect
 from navirl_cli.figures.plan import draw_plans
 from navirl_cli.files import Input
@@ -94,7 +95,7 @@ def learn(demonstrations: Sequence[Demonstration], choice: Choice) -> Learnt:
     Raises:
         NavirlError: No demonstration is left, or the fit is impossible.
     """
-    selected = select(demonstrations, conditions=choice.conditions, steps=choice.steps)
+    selected = select(demonstrations, Subset(condition=choice.conditions), steps=choice.steps)
     prior = None if choice.earlier is None else choice.earlier.as_prior()
     found = fit(selected.evidence, choice.start, prior=prior, scan=False)
     return Learnt(selected, found)

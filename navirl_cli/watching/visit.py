@@ -12,7 +12,7 @@ from navirl_cli.artefacts.demonstrations import demonstrations_document, demonst
 from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
-from navirl_cli.demos.recordings import extract_one
+from navirl_cli.demos.recordings import extracted
 from navirl_cli.errors import ArtefactError, NavirlError
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions
@@ -111,7 +111,7 @@ class Visit:
                 return Added(False)
         except ArtefactError as error:
             return Added(False, (str(error),))
-        found = extract_one(one.source, self.settings, self.options)
+        found = extracted((one.source, ()), self.settings, self.options, None, alone=False)
         if isinstance(found, NavirlError):
             return Added(False, (f"left out: {found}",))
         inputs, extraction = found
