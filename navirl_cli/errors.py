@@ -73,6 +73,10 @@ class MissingPackageError(NavirlError):
     """An optional package is not installed."""
 
 
+class WorkerLostError(NavirlError):
+    """The process that worked on an item ended, again and again."""
+
+
 class NavirlWarning(UserWarning):
     """A warning: the results are valid, but data was lost or skipped, or a fit did not converge.
 

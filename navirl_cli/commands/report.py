@@ -7,6 +7,7 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.artefacts.store import read_json
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -33,9 +34,10 @@ from navirl_cli.files import Input, replacing
 )
 @demos_argument
 @click.argument("reward", type=FilePath)
+@choice_options(reward=True)
 @section("Learnt paths", samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
-def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
+def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples: int, seed: int, force: bool) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
     The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
@@ -53,8 +55,9 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
-    demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations)
+    everyone = demonstrations_in(demos)
+    learnt = read_reward_for(reward, everyone)
+    demonstrations = choosing.of(everyone, [learnt])
     rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
