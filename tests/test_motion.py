@@ -150,4 +150,5 @@ def test_a_drive_towards_a_person_and_a_stop():
     # a person who walks towards the robot with the same speed halves the time
     track = PersonTrack("p", t, np.stack([3.0 - 0.1 * t, 0 * t], axis=1))
     made = moving(np.stack([0.1 * t, 0 * t], axis=1), t, people=[[2.5, 0.0]])
-    assert values(replace(made, tracks=(track,)))["time_to_collision_s"] == pytest.approx((1.0 - 0.25 - 0.25) / 0.2, abs=0.01)
+    found = values(replace(made, tracks=(track,)))
+    assert found["time_to_collision_s"] == pytest.approx((1.0 - 0.25 - 0.25) / 0.2, abs=0.01)

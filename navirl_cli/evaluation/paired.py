@@ -182,7 +182,8 @@ def pairs_of_all(
     for name in later:
         both = [group for group in by_group(files[first], fields) if group in by_group(files[name], fields)]
         named = [(name_in(files, name, group), name_in(files, first, group)) for group in both]
-        found += [(*pair, pairs_of(result.rows, *pair, metrics, rng)) for pair in named if pair not in asked]
+        same = [(*pair, pairs_of(result.rows, *pair, metrics, rng)) for pair in named if pair not in asked]
+        found += [pair for pair in same if pair[2]]
     if len(rewards) > 1:
         of_learnt = [metric for metric in metrics if metric.drive is None]
         one, *others = (learnt_type(name, rewards) for name in rewards)
@@ -191,7 +192,7 @@ def pairs_of_all(
             for other in others:
                 own = _of_paths((rows, other), (rows, one), of_learnt, rng)
                 found.append((f"{group}: {other}", one, own))
-    return _corrected([pair for pair in found if pair[2]])
+    return _corrected(found)
 
 
 def _corrected(pairs: Sequence[tuple[str, str, dict[str, Paired]]]) -> list[tuple[str, str, dict[str, Paired]]]:
