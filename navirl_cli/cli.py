@@ -30,6 +30,7 @@ COMMANDS = {
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",
+    "watch": "Learn from the recordings of a folder as they are finished, and plan the next paths.",
     "export": "Write a learnt reward for Nav2, for viewers, or in other conventions.",
     "view": "Show a scene under a learnt reward in Rerun.",
     "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",

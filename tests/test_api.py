@@ -120,7 +120,9 @@ def test_keywords_are_the_options_with_their_defaults(function, path):
     }
     options = options_of(*path)
     beyond = {"executor", "axes", "page", "demos", "demonstration", "reward", "name"}
-    of_the_shell = {"wide", "style", "group", "reward"} | ({"trial"} if "trial" not in keywords else set())
+    # `name` of plot.profile is one --parameter
+    of_the_shell = {"parameter", "wide", "style", "font", "group", "reward"}
+    of_the_shell |= {"trial"} if "trial" not in keywords else set()
     if "demonstration" in keywords:  # which demonstrations.select chooses
         of_the_shell |= {"condition", "cycle", "set", "participant", "all"}
     # the table of trials is a file to fill in

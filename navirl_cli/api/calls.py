@@ -39,6 +39,7 @@ from navirl_cli.artefacts.demonstrations import (
 )
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
+from navirl_cli.cluster import workers_of
 from navirl_cli.demos.contact import PushSettings
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.extract import ExtractSettings
@@ -105,6 +106,8 @@ def extract(
     time: str = "header",
     join: bool = False,
     strict: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
     executor: Executor | None = None,
 ) -> Demonstrations:
     """Turn MCAP logs into demonstrations, as ``navirl extract``.
@@ -140,8 +143,10 @@ def extract(
         time: Time of a message: the stamp in its "header", or the time of receipt in the "log".
         join: Treat all logs as parts of one recording.
         strict: Refuse damaged logs.
-        executor: Processes several logs in parallel; threads of this process by default. An executor of processes is
-            faster. Create it under ``if __name__ == "__main__":``.
+        workers: Number of processes that read several logs, in place of threads of this process; faster. Use it under
+            ``if __name__ == "__main__":``.
+        cluster: Address of a running Dask scheduler that distributes the logs.
+        executor: Any other executor that does so.
 
     Returns:
         The trials.
@@ -190,8 +195,8 @@ def extract(
     )
     table = None if trials is None else Path(trials)
     labels = None if table is None else read_labels(table)
-    with _workers(executor) as workers:
-        found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=workers)
+    with _executor(executor, workers, cluster) as where:
+        found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=where)
     said = settings_document(settings, options, map_file, table)
     return _extracted(found, said, [one for one in (map_file, table) if one is not None])
 
@@ -269,6 +274,8 @@ def fit(
     profile: str | Sequence[str] = (),
     cross_validate: str | None = None,
     seed: int = 0,
+    workers: int | None = None,
+    cluster: str | None = None,
     executor: Executor | None = None,
 ) -> FittedReward:
     """Learn a navigation reward from demonstrations, as ``navirl fit``.
@@ -305,8 +312,10 @@ def fit(
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
         seed: Seed of the bootstrap.
-        executor: Computes bootstrap and cross-validation in parallel; threads of this process by default. An executor
-            of processes is faster. Create it under ``if __name__ == "__main__":``.
+        workers: Number of processes for bootstrap and cross-validation, in place of threads of this process; faster.
+            Use it under ``if __name__ == "__main__":``.
+        cluster: Address of a running Dask scheduler that distributes them.
+        executor: Any other executor that does so.
 
     Returns:
         The reward with its covariance and its status.
@@ -356,9 +365,9 @@ def fit(
         method=chosen(Method, method, "method"),
     )
     effect = reach_effect(selected.demonstrations, found, which, reach_m)
-    with _workers(executor) as workers:
+    with _executor(executor, workers, cluster) as where:
         whole = which is Steps.ALL
-        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=workers)
+        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=where)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
@@ -489,13 +498,19 @@ def _warn(lines: Sequence[str], depth: int = 3) -> None:
 
 
 @contextmanager
-def _workers(executor: Executor | None) -> Iterator[Executor]:
-    """The executor: by default threads. Processes that cannot fork would run the user's script again."""
+def _executor(executor: Executor | None, workers: int | None, cluster: str | None) -> Iterator[Executor]:
+    """Where to work: by default in threads. Processes that cannot fork would run the user's script again."""
+    if sum(one is not None for one in (executor, workers, cluster)) > 1:
+        raise ArgumentError("`workers`, `cluster` and `executor` exclude each other: name one of them")
     if executor is not None:
         yield executor
-        return
-    with ThreadPoolExecutor(cores()) as own:
-        yield own
+    elif workers is not None or cluster is not None:
+        count = None if workers is None else int(within("workers", workers, 1, 4096))
+        with workers_of(count, cluster) as own:
+            yield own
+    else:
+        with ThreadPoolExecutor(cores()) as own:
+            yield own
 
 
 def _rewards(

@@ -27,6 +27,7 @@ from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
 from navirl_cli.figures.overlay import driven, overlays_of
@@ -35,7 +36,7 @@ from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
-from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
+from navirl_cli.figures.style import COLUMN_IN, FONTS, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ class PageOptions(TypedDict, total=False):
     wide: bool
     #: "paper", "screen" (twice the pixels) or "dark".
     style: str
+    #: "sans", or "times" for letters like those of an IEEE paper.
+    font: str
     #: File to write: .png, .pdf or .svg, with embedded fonts. The figure is then not shown.
     output: PathLike | None
     #: Replace an existing file.
@@ -67,6 +70,7 @@ def paths(
     trial: str | Collection[str] = (),
     axes: "Axes | None" = None,
     crop: bool = False,
+    together: bool = False,
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
@@ -81,15 +85,20 @@ def paths(
         trial: Only these trials.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the paths.
+        together: One map for all groups, also with more than 40 paths and without `axes`.
         **page: As in :class:`PageOptions`.
 
     Returns:
-        The axes.
+        The axes; those of the first group where each has its own.
 
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     demonstrations = subset_in(condition, cycle, set, participant, trial).of(demonstrations_in(demos))
+    groups = [] if together or axes is not None else panels_of(demonstrations)
+    if groups:
+        shape = {"panels": len(groups), "columns": 2}
+        return _drawn(lambda panels: draw_path_panels(panels, groups, crop=crop), None, page, **shape)[0]
     return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
 
 
@@ -207,13 +216,14 @@ def properties(
     all: bool = False,  # noqa: A002 the option's name
     samples: int = 100,
     seed: int = 0,
+    bars: bool = False,
     **page: Unpack[PageOptions],
 ) -> "list[Axes]":
-    """Draw length, distance and area of paths by condition, as bars (the paper's Fig. 7).
+    """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
         demos: Demonstrations, or their file.
-        reward: Adds bars of the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
         cycle: Only trials of these cycles.
         set: Only trials of these sets.
@@ -222,6 +232,7 @@ def properties(
         all: All trials. By default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
+        bars: Bars from 0 with standard deviations, in place of points.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -237,10 +248,11 @@ def properties(
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
-    bars = bars_of(result.groups, _taught(reward, demonstrations))
-    panels = len(PAPER_METRICS)
-    height_in = height_for(bars, _width_in(page))
-    return _drawn(lambda axes: draw_properties(axes, bars), None, page, panels=panels, height_in=height_in)
+    rows = bars_of(result.groups, _taught(reward, demonstrations))
+    panels, height_in = len(PAPER_METRICS), height_for(rows, _width_in(page))
+    return _drawn(
+        lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, panels=panels, height_in=height_in
+    )
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
@@ -390,11 +402,12 @@ def _drawn(
 ) -> "list[Axes]":
     """Draw on given axes, or on a new figure that is shown or written."""
     output, style = page.get("output"), one_of(tuple(LOOKS), page.get("style", "paper"), "style")
+    font = one_of(tuple(FONTS), page.get("font", "sans"), "font")
     if axes is not None and output is not None:
         raise ArgumentError("`output` is for new figures: save the figure of your `axes` yourself")
     if output is not None:
         check_target(Path(output), force=page.get("force", False))
-    with styled(style):
+    with styled(style, font):
         if axes is not None:
             draw(axes)
             return axes

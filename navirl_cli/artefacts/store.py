@@ -1,5 +1,6 @@
 """JSON files with a version. They are checked against their schema when they are read."""
 
+import hashlib
 import json
 import re
 from collections.abc import Mapping
@@ -28,24 +29,30 @@ def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: 
 
     Args:
         path: The file.
-        artefact: "demonstrations", "reward", "metrics" or "study".
+        artefact: "demonstrations", "reward", "metrics", "study" or "manifest".
         content: Without the fields that name format and version.
         force: Whether to replace an existing file.
 
     Raises:
         ArtefactError: The file cannot be written.
     """
-    document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
     with replacing(path, force=force) as temporary:
-        temporary.write_text(json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_bytes(as_bytes(artefact, content))
 
 
-def read_json(path: Path, artefact: str) -> dict[str, Any]:
+def as_bytes(artefact: str, content: Mapping[str, Any]) -> bytes:
+    """The bytes of an artefact's file; arguments as of :func:`write_json`."""
+    document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
+    return (json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n").encode()
+
+
+def read_json(path: Path, artefact: str, sha256: str | None = None) -> dict[str, Any]:
     """Read an artefact and check it against its schema.
 
     Args:
         path: The file.
         artefact: As in :func:`write_json`.
+        sha256: What its bytes must hash to; None for any.
 
     Returns:
         Its content in the present version, whichever version of navirl wrote it.
@@ -53,7 +60,7 @@ def read_json(path: Path, artefact: str) -> dict[str, Any]:
     Raises:
         ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
-    return _checked(_content(path, artefact), path, artefact)
+    return _checked(_content(path, artefact, sha256), path, artefact)
 
 
 def read_any(path: Path) -> tuple[str, dict[str, Any]]:
@@ -77,14 +84,17 @@ def read_any(path: Path) -> tuple[str, dict[str, Any]]:
     return kind, _checked(document, path, kind)
 
 
-def _content(path: Path, artefact: str) -> Any:
-    """The content of a JSON file.
+def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
+    """The content of a JSON file; arguments as of :func:`read_json`.
 
     Raises:
         ArtefactError: It cannot be read.
     """
     try:
-        return _parsed(read_regular(path).decode("utf-8"))
+        data = read_regular(path)
+        if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+            raise ArtefactError(f"{path}: expected the bytes that the manifest names, found others; extract again")
+        return _parsed(data.decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
@@ -119,7 +129,11 @@ def _parsed(text: str) -> Any:
     """
     document = json.loads(text, parse_constant=_refuse_constant)
     if _SURROGATE.search(text):
-        json.dumps(document, ensure_ascii=False).encode("utf-8")
+        try:
+            json.dumps(document, ensure_ascii=False).encode("utf-8")
+        except UnicodeEncodeError as error:
+            half = ascii(error.object[error.start])[1:-1]
+            raise ValueError(f"{half}, half of a surrogate pair, which no text has; write the file again") from error
     return document
 
 

@@ -8,6 +8,7 @@ import click
 
 from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands import completion
 from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
@@ -24,6 +25,7 @@ from navirl_cli.commands.shared import (
     progress_bar,
     say,
     seed_option,
+    workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
 from navirl_cli.commands.usage import Command, Example, as_options, section
@@ -127,6 +129,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     ),
     seed_option,
 )
+@workers_options
 @section("Output", output_option("Reward file to write."), json_option, force_option)
 def fit(
     demos: Path,
@@ -148,6 +151,8 @@ def fit(
     profiles: tuple[str, ...],
     cross_validate: str | None,
     seed: int,
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -182,13 +187,11 @@ def fit(
         say(line)
     plain = _learn(evidence, start, earlier, l2, Method(method))
     effect = reach_effect(chosen, plain, Steps(steps), reach)
-    found, analyses, lost = answers(
-        evidence,
-        plain,
-        questions,
-        whole_paths=Steps(steps) is Steps.ALL,
-        bars=progress_bar,
-    )
+    with workers_of(workers, cluster) as executor:
+        whole = Steps(steps) is Steps.ALL
+        found, analyses, lost = answers(
+            evidence, plain, questions, whole_paths=whole, executor=executor, bars=progress_bar
+        )
     document = reward_document(
         found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )

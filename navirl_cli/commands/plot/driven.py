@@ -34,16 +34,25 @@ if TYPE_CHECKING:
 @page_options
 @demos_argument
 @choice_options(reward=False)
-@section("Scene", crop_option)
-def paths(page: Page, demos: Path, choosing: Choosing, crop: bool) -> None:
+@section(
+    "Scene",
+    crop_option,
+    click.option("--together", is_flag=True, help="One map for all groups, also with more than 40 paths."),
+)
+def paths(page: Page, demos: Path, choosing: Choosing, crop: bool, together: bool) -> None:
     """Draw all driven paths over the map, by condition.
 
-    As in Fig. 3 of the paper. Stretches in contact are thicker.
+    As in Fig. 3 of the paper. Stretches in contact are thicker. More than 40 paths have a map for each group.
     """
+    from navirl_cli.figures.conditions import draw_path_panels, panels_of
     from navirl_cli.figures.paths import draw_paths
 
     demonstrations = choosing.of(demonstrations_in(demos))
-    page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
+    panels = [] if together else panels_of(demonstrations)
+    if panels:
+        page.draw(lambda axes: draw_path_panels(axes, panels, crop=crop), panels=len(panels), columns=2)
+    else:
+        page.draw(lambda axes: draw_paths(axes[0], demonstrations, crop=crop))
 
 
 @click.command(
@@ -61,15 +70,18 @@ def paths(page: Page, demos: Path, choosing: Choosing, crop: bool) -> None:
     click.option(
         "--reward",
         type=FilePath,
-        help="Learnt reward; adds bars of its paths, for the groups from which it was learnt.",
+        help="Learnt reward; adds its paths, for the groups from which it was learnt.",
     ),
     samples_option(100),
     seed_option,
 )
-def properties(page: Page, demos: Path, choosing: Choosing, reward: Path | None, samples: int, seed: int) -> None:
-    """Draw length, distance and area of paths as bars, by group.
+@section("Look", click.option("--bars", "as_bars", is_flag=True, help="Bars from 0, as in Fig. 7 of the paper."))
+def properties(
+    page: Page, demos: Path, choosing: Choosing, reward: Path | None, samples: int, seed: int, as_bars: bool
+) -> None:
+    """Draw length, distance and area of paths by group.
 
-    As in Fig. 7 of the paper: means, with standard deviations as whiskers.
+    Points are means with their 95 % intervals, from participants' means, and with standard deviations as thin lines.
     """
     from navirl_cli.evaluation.groups import group_of
     from navirl_cli.evaluation.metrics import PAPER_METRICS
@@ -83,7 +95,9 @@ def properties(page: Page, demos: Path, choosing: Choosing, reward: Path | None,
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     bars = bars_of(result.groups, taught)
     page.draw(
-        lambda axes: draw_properties(axes, bars), height_in=height_for(bars, page.width_in), panels=len(PAPER_METRICS)
+        lambda axes: draw_properties(axes, bars, as_bars=as_bars),
+        height_in=height_for(bars, page.width_in),
+        panels=len(PAPER_METRICS),
     )
     finish(result.notes)
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is imported only to draw a figure.
 STYLES = ("paper", "screen", "dark")
+#: Keys of :data:`navirl_cli.figures.style.FONTS`.
+FONTS = ("sans", "times")
 #: Extensions of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -34,6 +36,7 @@ class Page:
     wide: bool
     style: str
     force: bool
+    font: str = "sans"
 
     @property
     def width_in(self) -> float:
@@ -47,7 +50,7 @@ class Page:
         """Draw in the chosen style."""
         from navirl_cli.figures.style import styled
 
-        with styled(self.style):
+        with styled(self.style, self.font):
             yield
 
     def save(self, figure: Any, *, trim: bool = True) -> None:
@@ -81,10 +84,10 @@ def page_options(function: Function) -> Function:
     """Options of every figure, as argument ``page``; a file that cannot be written is refused early."""
 
     @wraps(function)
-    def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
+    def packed(output: Path, wide: bool, style: str, font: str, force: bool, **others: Any) -> Any:
         given = (path for value in others.values() for path in (value if isinstance(value, tuple) else (value,)))
         check_output(output, [path for path in given if isinstance(path, Path)], force=force)
-        return function(page=Page(output, wide, style, force), **others)
+        return function(page=Page(output, wide, style, force, font), **others)
 
     figure_options = section(
         "Output",
@@ -98,6 +101,13 @@ def page_options(function: Function) -> Function:
             default="paper",
             show_default=True,
             help="paper: 300 dpi; screen: 600 dpi; dark: light ink on near-black, 600 dpi.",
+        ),
+        click.option(
+            "--font",
+            type=Choice(FONTS),
+            default="sans",
+            show_default=True,
+            help="Letters; times: like those of an IEEE paper.",
         ),
         force_option,
     )
