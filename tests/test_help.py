@@ -153,6 +153,7 @@ def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch
 
 #: Objects whose keys are names of the data: participants, groups, modalities, metrics, reasons.
 BY_DATA = {
+    "groups",
     "parameters",
     "reward_by_term",
     "participants",

@@ -34,7 +34,8 @@ class FileOrFolder(click.Path):
         if isinstance(value, Output):
             return value
         text = fsdecode(super().convert(value, param, ctx))
-        return Output(Path(text), text.endswith(("/", sep)) or isdir(text))
+        is_folder = isdir(text)  # noqa: PTH112 no folder has a name that is too long, which is_dir raises
+        return Output(Path(text), text.endswith(("/", sep)) or is_folder)
 
 
 class Choice(click.Choice[str]):
