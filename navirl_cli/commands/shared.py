@@ -214,18 +214,19 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[int, str], None]]:
+def progress_bar(label: str, length: int | None = None, *, lines: bool = False) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, if stderr is a terminal.
 
     Args:
         label: The present work.
         length: Number of steps, or None if it is not known.
+        lines: Whether to print a line for each step elsewhere: for work of minutes.
 
     Yields:
         A function that takes the number of steps done and a short text on the present one.
     """
     if not sys.stderr.isatty():
-        yield lambda _done, _word: None
+        yield lambda done, word: say(f"{label} {done} of {length}: {word}") if lines else None
         return
     steps = None if length is not None else iter(int, 1)
     new = click.progressbar(
