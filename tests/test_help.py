@@ -123,6 +123,7 @@ TABLES = {
     "fit": ["demos.json", "--cycle", "2", "--intervals", "wald", "-o", "new.json"],
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
+    "info": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],
     "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
