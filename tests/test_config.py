@@ -76,6 +76,6 @@ def test_quiet_leaves_out_remarks_and_verbose_adds_lines(navirl):
     assert navirl("select", "a.json", "-o", "c.json", "--quiet").stderr == ""
     lines = navirl("evaluate", "a.json", "--verbose").stderr
     assert "navirl: navirl.toml: nothing for this command\n" in lines
-    assert "navirl: evaluate: 2 of 2\n" in lines
+    assert "navirl: evaluate 2 of 2\n" in lines
     assert "s of CPU\n" in lines
     assert "exclude each other" in navirl("select", "a.json", "-o", "d.json", "--quiet", "--verbose", code=2).stderr

@@ -1,5 +1,6 @@
 """``navirl report``: one page on demonstrations and the reward learnt from them."""
 
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -21,6 +22,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.files import Input, replacing
 
@@ -52,6 +54,7 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
+    from navirl_cli.reports.made import Made, changed_settings
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
@@ -75,9 +78,13 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
         figures = draw_report(
             demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
         )
-        made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        extracted = read_json(demos, "demonstrations")
+        made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        logs = tuple(one["file"] for one in extracted["inputs"])
+        changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
+        made = Made(demos.name, reward.name, logs, changed, samples, seed)
         content = report_of(
-            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, seed
+            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, made
         )
         page = to_html(content)
     with replacing(output, force=force) as temporary:

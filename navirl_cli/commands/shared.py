@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -224,18 +225,19 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[int, str], None]]:
+def progress_bar(label: str, length: int | None = None, *, lines: bool = False) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, if stderr is a terminal.
 
     Args:
         label: The present work.
         length: Number of steps, or None if it is not known.
+        lines: Whether to print a line for each step elsewhere: for work of minutes.
 
     Yields:
         A function that takes the number of steps done and a short text on the present one.
     """
     if is_quiet() or not sys.stderr.isatty():
-        yield _by_lines(label, length) if is_verbose() else lambda _done, _word: None
+        yield _by_lines(label, length, every_s=0.0 if lines else EVERY_S if is_verbose() else inf)
         return
     steps = None if length is not None else iter(int, 1)
     new = click.progressbar(
@@ -249,15 +251,15 @@ def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[in
         yield update
 
 
-def _by_lines(label: str, length: int | None) -> Callable[[int, str], None]:
-    """Progress as lines, at most one in EVERY_S and one at the end."""
-    last = -EVERY_S
+def _by_lines(label: str, length: int | None, every_s: float) -> Callable[[int, str], None]:
+    """Progress as lines, at most one in a time, and one at the end; none where the time is infinite."""
+    last = -every_s
 
     def update(done: int, word: str) -> None:
         nonlocal last
-        if done == length or monotonic() - last >= EVERY_S:
+        if every_s < inf and (done == length or monotonic() - last >= every_s):
             last = monotonic()
-            say(f"{label}: {done}" + ("" if length is None else f" of {length}") + (f", {word}" if word else ""))
+            say(f"{label} {done}" + ("" if length is None else f" of {length}") + (f": {word}" if word else ""))
 
     return update
 
