@@ -124,6 +124,7 @@ TABLES = {
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "info": ["demos.json"],
+    "config": [],
     "plan": ["reward.json", "--scene", "demos.json"],
     "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],

@@ -83,7 +83,10 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
             "Two metrics of two groups, compared by participant",
             "navirl evaluate demos.json --metrics length_m,area_m2 --pair 'force, cycle 2' joystick",
         ),
-        Example("Several days in one table, with medians", "navirl evaluate monday.json tuesday.json --quantiles 0.5"),
+        Example(
+            "Several files in a table for a paper, with medians",
+            "navirl evaluate monday.json tuesday.json --quantiles 0.5 -o metrics.tex",
+        ),
     ],
 )
 @click.argument("demos", metavar="DEMOS...", nargs=-1, type=FilePath)
