@@ -24,6 +24,8 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
 }
 SLOW = {
+    "report demos.json reward.json --samples 50 -o report.html --force",
+    "simulate -o simulated",
     "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",

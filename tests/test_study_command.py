@@ -137,6 +137,7 @@ def test_without_a_terminal_each_fit_has_a_line(written):
     assert lines[-1].endswith(f"{len(lines)} of {len(lines)}: all")
 
 
+@pytest.mark.slow
 def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
     out, _ = written
     words = [

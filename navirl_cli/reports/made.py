@@ -87,7 +87,7 @@ def _commands(
     changed = [
         word
         for name, option in _OPTIONS.items()
-        if content[name] != _FIT[name]
+        if content.get(name, _FIT[name]) != _FIT[name]
         for word in (option, ",".join(content[name]) if name == "terms" else f"{content[name]}")
     ]
     fit = shlex.join(["navirl", "fit", made.demos, *words, *changed, "-o", made.reward])
