@@ -14,7 +14,7 @@ import numpy as np
 
 from navirl_cli.api.arguments import one_of, texts, within
 from navirl_cli.api.calls import policy as policy_in
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, reward_in
+from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
 from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
@@ -85,6 +85,7 @@ def policy(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -98,6 +99,7 @@ def policy(
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the likely paths.
         overlay: Draw paths over the map: "demos", "samples", or both.
@@ -113,7 +115,7 @@ def policy(
     Raises:
         NavirlError: The scene has no policy under the reward, or the figure cannot be written.
     """
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), _own(axes), page)[
         0
@@ -124,6 +126,7 @@ def reward(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -133,7 +136,7 @@ def reward(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     by_cell = view.reward.by_cell(view.scene)
     return _drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), _own(axes), page)[0]
@@ -143,6 +146,7 @@ def value(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -152,7 +156,7 @@ def value(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), _own(axes), page
@@ -163,6 +167,7 @@ def actions(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -172,7 +177,7 @@ def actions(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_actions(
@@ -187,6 +192,7 @@ def properties(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward | None = None,
     *,
+    person: str | None = None,
     samples: int = 100,
     seed: int = 0,
     **page: Unpack[PageOptions],
@@ -196,6 +202,7 @@ def properties(
     Args:
         demos: Demonstrations, or their file.
         reward: Adds bars of the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        person: As in :func:`policy`.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
         **page: As in :class:`PageOptions`.
@@ -207,6 +214,9 @@ def properties(
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
+    if person is not None and reward is None:
+        raise ArgumentError("`person` goes with `reward`")
+    reward = of_one(reward, person)
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
@@ -237,6 +247,7 @@ def ranks(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward,
     *,
+    person: str | None = None,
     group: str | Sequence[str] = (),
     samples: int = 1000,
     seed: int = 0,
@@ -247,6 +258,7 @@ def ranks(
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
+        person: As in :func:`policy`.
         group: Groups to rank; by default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
@@ -260,6 +272,7 @@ def ranks(
             the figure cannot be written.
     """
     demonstrations = demonstrations_in(demos)
+    reward = of_one(reward, person)
     parameters = reward_in(reward, demonstrations)
     known = isinstance(reward, str | Path | LearntReward)
     trained = learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]

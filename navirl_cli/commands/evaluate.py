@@ -19,6 +19,7 @@ from navirl_cli.commands.shared import (
     force_option,
     json_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
@@ -96,6 +97,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         type=FilePath,
         help="Learnt reward, to measure the paths of its policy too; repeatable.",
     ),
+    person_option,
     samples_option(),
     click.option(
         "--precision",
@@ -141,6 +143,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
 def evaluate(
     demos: Path | None,
     rewards: tuple[Path, ...],
+    person: str | None,
     metrics: tuple[Metric, ...],
     list_metrics: bool,
     fields: tuple[str, ...],
@@ -168,11 +171,13 @@ def evaluate(
     if demos is None:
         raise click.UsageError("Missing argument 'DEMOS'.")
     _check_arguments(rewards, pairs, ranks=ranks)
+    if person is not None and not rewards:
+        raise click.UsageError("--person goes with --reward.")
     if output is not None:
         check_output(output, [demos, *rewards], force=force)
     demonstrations = demonstrations_in(demos)
     groups_named(demonstrations, [name for pair in pairs for name in pair], fields, "pair")  # refuses unknown ones
-    files = {path.stem: read_reward_for(path, demonstrations) for path in rewards}
+    files = {path.stem: read_reward_for(path, demonstrations, person) for path in rewards}
     learnt = {name: one.reward for name, one in files.items()}
     trained = next(iter(files.values())).trained(demonstrations) if ranks else None
     if ranks:

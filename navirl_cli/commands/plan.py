@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, read_reward
+from navirl_cli.commands import completion
 from navirl_cli.commands.plot.page import FORMATS
 from navirl_cli.commands.shared import (
     check_output,
@@ -158,6 +159,16 @@ def _check_arguments(where: Place, mode: str, count: int | None, tolerance: floa
 )
 @click.argument("reward", type=FilePath)
 @section(
+    "Reward",
+    click.option(
+        "--person-name",
+        metavar="NAME",
+        shell_complete=completion.persons,
+        help="Drive by this person's own reward, of a reward fitted with --pool persons.  [default: the typical "
+        "person's]",
+    ),
+)
+@section(
     "Scene",
     click.option("--scene", metavar="DEMOS[:TRIAL]", help="Scene of a demonstration, by default of the first one."),
     click.option("--log", type=FilePath, help="Map, people, pose and goal of a recording."),
@@ -204,6 +215,7 @@ def _check_arguments(where: Place, mode: str, count: int | None, tolerance: floa
 )
 def plan(
     reward: Path,
+    person_name: str | None,
     mode: str,
     count: int | None,
     seed: int,
@@ -234,7 +246,7 @@ def plan(
     for path in (output, figure):
         if path is not None:
             check_output(path, inputs, force=force)
-    learnt = read_reward(reward)
+    learnt = read_reward(reward, person_name)
     planner = Planner(where.problem(learnt), learnt.reward)
     if recommend:
         _recommend(learnt, planner.problem)

@@ -5,7 +5,7 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.rewards import check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.shared import (
     check_output,
@@ -14,6 +14,7 @@ from navirl_cli.commands.shared import (
     finish,
     force_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
@@ -33,9 +34,9 @@ from navirl_cli.files import Input, replacing
 )
 @demos_argument
 @click.argument("reward", type=FilePath)
-@section("Learnt paths", samples_option(), seed_option)
+@section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
-def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
+def report(demos: Path, reward: Path, person: str | None, output: Path, samples: int, seed: int, force: bool) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
     The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
@@ -54,7 +55,9 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
 
     check_output(output, [demos, reward], force=force)
     demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations)
+    content = reward_content(reward, person)
+    learnt = learnt_of(content, str(reward))
+    check_cells(learnt, demonstrations, str(reward))
     rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
@@ -73,10 +76,7 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
             demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
         )
         made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
-        content = report_of(
-            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, seed
-        )
-        page = to_html(content)
+        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, seed))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)

@@ -78,6 +78,20 @@ def select(
     return with_steps(chosen, steps, reach_m)
 
 
+def of_participant(demonstrations: Sequence[Demonstration], person: str | None) -> Sequence[Demonstration]:
+    """The demonstrations of one participant; all of them for None.
+
+    Raises:
+        DemonstrationError: There are none of this participant.
+    """
+    if person is None:
+        return demonstrations
+    own = [one for one in demonstrations if one.participant == person]
+    if not own:
+        raise DemonstrationError(unknown("`person`", person, sorted({one.participant for one in demonstrations})))
+    return own
+
+
 def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None) -> Selection:
     """Demonstrations with those of their steps that count; arguments, result and errors as of :func:`select`."""
     masks, reach = None, None

@@ -9,7 +9,15 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands import completion
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.shared import (
+    demonstrations_in,
+    demos_argument,
+    person_option,
+    progress_bar,
+    samples_option,
+    say,
+    seed_option,
+)
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, Function, section
 
@@ -40,8 +48,10 @@ def _group_option(count: str) -> Callable[[Function], Function]:
 @page_options
 @demos_argument
 @section("Demonstrations", _group_option("repeatable; by default the groups that the reward was learnt from"))
-@section("Learnt paths", reward_option, samples_option(), seed_option)
-def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
+@section("Learnt paths", reward_option, person_option, samples_option(), seed_option)
+def ranks(
+    page: Page, demos: Path, reward: Path, person: str | None, groups: tuple[str, ...], samples: int, seed: int
+) -> None:
     """Draw how demonstrations rank among paths of the policy.
 
     Ranks are by log-likelihood, with a panel for each group. They are uniform if the policy is right.
@@ -54,7 +64,7 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
     from navirl_cli.reports.ranks import rank_lines
 
     demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations)
+    learnt = read_reward_for(reward, demonstrations, person)
     trained = learnt.trained(demonstrations)
     others: dict[str, int] = {}
     if groups:

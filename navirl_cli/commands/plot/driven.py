@@ -11,6 +11,7 @@ from navirl_cli.commands.shared import (
     demonstrations_in,
     demos_argument,
     finish,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
@@ -60,10 +61,11 @@ def paths(page: Page, demos: Path, crop: bool) -> None:
         type=FilePath,
         help="Learnt reward; adds bars of its paths, for the groups from which it was learnt.",
     ),
+    person_option,
     samples_option(100),
     seed_option,
 )
-def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed: int) -> None:
+def properties(page: Page, demos: Path, reward: Path | None, person: str | None, samples: int, seed: int) -> None:
     """Draw length, distance and area of paths as bars, by group.
 
     As in Fig. 7 of the paper: means, with standard deviations as whiskers.
@@ -72,8 +74,10 @@ def properties(page: Page, demos: Path, reward: Path | None, samples: int, seed:
     from navirl_cli.evaluation.metrics import PAPER_METRICS
     from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 
+    if person is not None and reward is None:
+        raise click.UsageError("--person goes with --reward.")
     demonstrations = demonstrations_in(demos)
-    learnt = None if reward is None else read_reward_for(reward, demonstrations)
+    learnt = None if reward is None else read_reward_for(reward, demonstrations, person)
     result = _compared(demonstrations, learnt, samples, seed)
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     bars = bars_of(result.groups, taught)

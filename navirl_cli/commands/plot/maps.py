@@ -10,7 +10,7 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, person_option, seed_option
 from navirl_cli.commands.types import Choice, Count
 from navirl_cli.commands.usage import Command, Example, Function, section
 
@@ -91,14 +91,15 @@ def scene_options(function: Function) -> Function:
     """Options of figures of one scene, as arguments ``page`` and ``sight``."""
 
     @wraps(function)
-    def packed(page: Page, demos: Path, reward: Path, trial: str | None, **others: Any) -> Any:
+    def packed(page: Page, demos: Path, reward: Path, person: str | None, trial: str | None, **others: Any) -> Any:
         demonstrations = demonstrations_in(demos)
-        learnt = read_reward_for(reward, demonstrations).reward
+        learnt = read_reward_for(reward, demonstrations, person).reward
         return function(page, Sight(demonstrations, trial_of(demonstrations, trial), learnt, **others))
 
     scene = section(
         "Scene",
         reward_option,
+        person_option,
         trial_option,
         crop_option,
         click.option(
