@@ -26,6 +26,8 @@ COMMANDS = {
     "evaluate": "Measure demonstrated, learnt and baseline paths, and compare groups of them.",
     "plot": "Draw paths, policies, rewards, path properties and fits.",
     "plan": "Plan the path of a robot that drives by a learnt reward.",
+    "export": "Write a learnt reward for Nav2, for viewers, or in other conventions.",
+    "view": "Show a scene under a learnt reward in Rerun.",
     "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",

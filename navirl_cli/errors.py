@@ -5,7 +5,7 @@ line prints it and exits with 1, or with 3 where all trials were left out as cut
 keeps its traceback.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
 #: Largest number of names that a message lists.
@@ -90,8 +90,37 @@ def joined(reasons: Iterable[str], prefix: str = "") -> str:
 
 def brief(value: object) -> str:
     """A value as a message shows it: on one line, cut to the length of a line."""
-    text = " ".join(repr(value).split())
+    text = ""
+    for piece in _pieces(value):
+        text += piece
+        if len(text) > 400:  # what follows is cut
+            break
+    text = " ".join(text.split())
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _pieces(value: object) -> Iterator[str]:
+    """The `repr` of a value piece by piece, so that what is large or shared is never written out as a whole."""
+    if type(value) is list:
+        yield "["
+        for number, one in enumerate(value):
+            yield ", " if number else ""
+            yield from _pieces(one)
+        yield "]"
+    elif type(value) is dict:
+        yield "{"
+        for number, (key, one) in enumerate(value.items()):
+            yield f"{', ' if number else ''}"
+            yield from _pieces(key)
+            yield ": "
+            yield from _pieces(one)
+        yield "}"
+    elif isinstance(value, str | bytes) and len(value) > 400:
+        yield repr(value[:400])
+    elif isinstance(value, int) and value.bit_length() > 14_000:  # Python does not write more digits
+        yield f"an integer of {value.bit_length()} bits"
+    else:
+        yield repr(value)
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:

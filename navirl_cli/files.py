@@ -4,17 +4,63 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from errno import EINVAL
 from hashlib import sha256
 from itertools import count
 from pathlib import Path
 from shutil import rmtree
 from socket import gethostname
-from stat import S_ISDIR, S_ISREG
+from stat import S_ISBLK, S_ISCHR, S_ISDIR, S_ISFIFO, S_ISREG, S_ISSOCK
+from typing import BinaryIO, Final
 
 from navirl_cli.errors import ArtefactError
 
 #: Numbers of this process's temporary files.
 _NUMBERS = count()
+#: What a path can be besides a regular file.
+_NOT_REGULAR: Final = (
+    (S_ISDIR, "a folder"),
+    (S_ISFIFO, "a pipe (FIFO)"),
+    (S_ISSOCK, "a socket"),
+    (S_ISCHR, "a device"),
+    (S_ISBLK, "a device"),
+)
+
+
+class NotRegularError(OSError):
+    """A path is something else than a regular file; `strerror` says what, and the remedy."""
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file, never a FIFO, which would block, a device, which may have no end, or a socket.
+
+    Args:
+        path: Its name.
+
+    Raises:
+        OSError: There is no such file, it cannot be read, or it is something else (:class:`NotRegularError`).
+    """
+    _check_regular(path, path.stat().st_mode)  # a device is not even opened
+    file = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+    try:
+        _check_regular(path, os.fstat(file.fileno()).st_mode)
+    except OSError:
+        file.close()
+        raise
+    return file
+
+
+def read_regular(path: Path) -> bytes:
+    """The bytes of a regular file; raises as :func:`open_regular`."""
+    with open_regular(path) as file:
+        return file.read()
+
+
+def _check_regular(path: Path, mode: int) -> None:
+    if not S_ISREG(mode):
+        name = next((name for is_one, name in _NOT_REGULAR if is_one(mode)), "something else")
+        remedy = "name a file in it" if S_ISDIR(mode) else "save its bytes to a file first"
+        raise NotRegularError(EINVAL, f"expected a regular file, found {name}; {remedy}", str(path))
 
 
 @dataclass(frozen=True)
@@ -33,7 +79,7 @@ class Input:
         """
         digest = sha256()
         try:
-            with path.open("rb") as stream:
+            with open_regular(path) as stream:
                 while block := stream.read(1 << 20):
                     digest.update(block)
         except OSError as error:

@@ -17,6 +17,7 @@ from navirl_cli.cli import cli
 from navirl_cli.errors import NavirlWarning
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.terms import TERMS, registry
+from navirl_cli.reports import recommendation
 
 SCENE = make.scene_on(make.open_grid(16, 12), [0, 5], [15, 5], [[0.8, 0.3]])
 OWN = Path(__file__).with_name("toy_term.py")
@@ -102,7 +103,8 @@ def test_fit_evaluate_and_python(run, term):
 
 
 @drawn_terms
-def test_every_figure_and_page(run, term):
+def test_every_figure_and_page(run, term, monkeypatch):
+    monkeypatch.setattr(recommendation, "DRAWS", 2)
     reward = f"{term}.json"
     for kind in ("policy", "reward", "value", "actions"):
         run("plot", kind, "demos.json", "--reward", reward, "--overlay", "samples", "-o", f"{kind}.png")

@@ -15,6 +15,14 @@ EVERY = [pytest.param(words, command, id=" ".join(words)) for words, command in 
 WRONG = {Choice: "nonsense", Count: "-1000000", Number: "nan", OutputPath: "x.doc", Point: "here", RoleTopic: "ft"}
 
 
+#: What commands need besides, which depends on their other options.
+NEEDED = {
+    ("plot", "compare"): ("--group", "a", "--group", "b"),
+    ("export",): ("-o", "none"),
+    ("view",): ("--scene", "none.json", "-o", "none.rrd"),
+}
+
+
 def least(words, command):
     """The words that a command needs at least, with files that do not exist."""
     given = [*words]
@@ -23,8 +31,8 @@ def least(words, command):
             given.append("none.json")
         elif param.required:
             ending = param.type.endings[0] if isinstance(param.type, OutputPath) else ""
-            given += [param.opts[0], f"none{ending}"]
-    return [*given, *(("--group", "a", "--group", "b") if words == ("plot", "compare") else ())]
+            given += [param.opts[0], param.type.choices[0] if isinstance(param.type, Choice) else f"none{ending}"]
+    return [*given, *NEEDED.get(words, ())]
 
 
 def wrong_values():

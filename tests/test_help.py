@@ -3,12 +3,14 @@
 import json
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import published_factory as forge
 import pytest
 from click.testing import CliRunner
 from command_line import commands, options
+from rerun_fake import fake_rerun
 
 from navirl_cli.cli import cli
 from navirl_cli.commands.usage import Command
@@ -118,6 +120,7 @@ TABLES = {
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
     "plan": ["reward.json", "--scene", "demos.json"],
+    "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
     "simulate": ["--participants", "1", "-o", "new"],
     "study": ["demos.json", "--samples", "20", "-o", "new"],
@@ -171,6 +174,7 @@ def keys_in(document, by_data=False):
 @pytest.mark.parametrize("line", [marked(line) for words, _ in commands() for line in examples_in(help_of(*words))])
 def test_examples_run(folder, tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "rerun", fake_rerun())
     words = shlex.split(line)[1:]
     output = words[words.index("-o") + 1] if "-o" in words else None
     for path in folder.iterdir():

@@ -7,9 +7,11 @@ import factories as make
 import numpy as np
 import pytest
 
+from navirl_cli.irl import intervals as module
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind, default_kind, intervals, quantile
+from navirl_cli.irl.objective import Objective
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.status import Status
 
@@ -46,7 +48,24 @@ def test_the_ends_of_a_profile_are_where_the_best_likelihood_has_fallen(evidence
     value = found.reward.theta[NAMES.index(name)]
     assert ends.lower < value < ends.upper
     for end in (ends.lower, ends.upper):
-        assert best_at(evidence, name, end) - found.objective == pytest.approx(-1.9207, abs=0.03)
+        assert best_at(evidence, name, end) - found.objective == pytest.approx(-1.9207, abs=0.003)
+
+
+def test_an_end_takes_few_evaluations_of_the_likelihood(evidence, found, monkeypatch):
+    made = []
+
+    class Counted(Objective):
+        @staticmethod
+        def of(*given):
+            made.append(Objective.of(*given))
+            return made[-1]
+
+    monkeypatch.setattr(module, "Objective", Counted)
+    intervals(evidence, found, Kind.PROFILE)
+    begun = made[0].evaluations
+    intervals(evidence, replace(found, scanned=found.scanned[:0]), Kind.PROFILE)
+    assert len(found.scanned) > 8
+    assert begun < made[1].evaluations < 40, "8 ends, and the profile; the scan of the fit spares a part"
 
 
 def test_wald_intervals_are_estimate_and_error(evidence, found):

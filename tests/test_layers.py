@@ -12,7 +12,8 @@ PACKAGE = Path(navirl_cli.__file__).parent
 ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
-        ["files", "parallel", "documents"],
+        ["files", "parallel"],
+        ["documents"],
         ["logs"],
         ["demos"],
         ["irl"],

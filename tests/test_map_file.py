@@ -234,7 +234,7 @@ REMEDY = "; correct it, or save the map again with map_saver_cli"
         ({"mode": "ternary"}, "key mode: expected trinary, scale or raw, found 'ternary';"),
         ({"mode": "[raw]"}, "key mode: expected trinary, scale or raw, found ['raw'];"),
         ({"image": "none.png"}, "key image: expected a pgm, png or bmp file, found no file {folder}/none.png; put"),
-        ({"image": "."}, "key image: expected a pgm, png or bmp file, found at {folder}: Is a directory;"),
+        ({"image": "."}, "found at {folder}: expected a regular file, found a folder;"),
         ({"image": '"a\\0b"'}, "one that does not decode ('embedded null byte')"),
         ({"image": "text.png"}, "found something else at {folder}/text.png" + REMEDY),
         ({"image": "photo.jpg"}, "found something else at {folder}/photo.jpg" + REMEDY),
@@ -279,7 +279,7 @@ def test_what_is_no_map_is_named(tmp_path, keys, message):
         (b"\xff\xfe\x00", "found 'utf-8' codec can't decode byte 0xff"),
         (b"made: 2024-13-45\n", "found month must be in 1..12"),
         (b"made: !!bool maybe\n", "found 'maybe'"),
-        (b"[" * 500, "found maximum recursion depth exceeded"),
+        (b"[" * 500, "found line 1: more than 40 levels of nesting"),
         (b"P5 3 1 255\n\0\0\0", "found "),
     ],
 )

@@ -8,6 +8,7 @@ import pytest
 from navirl_cli.evaluation.meaning import (
     accepted_detour_m,
     beside_detour_m,
+    drawn_rewards,
     half_distance_m,
     longer_path_odds,
     meanings,
@@ -120,3 +121,13 @@ def test_all_draws_lie_within_the_bounds():
     wild = np.diag([9.0, 0.04, 0.5, 100.0])
     for one in meanings(REWARD, wild, 0.1, 0.7, np.random.default_rng(1)):
         assert np.isfinite([one.lower, one.upper]).all()
+
+
+def test_drawn_rewards_have_the_intervals_of_the_estimate_and_there_are_none_where_one_is_open():
+    def drawn(intervals):
+        return drawn_rewards(REWARD, COVARIANCE, intervals, 4000, np.random.default_rng(0))
+
+    edges = np.quantile([one.theta for one in drawn(interval_of(**ENDS))], [0.025, 0.975], axis=0)
+    np.testing.assert_allclose(edges.T, list(ENDS.values()), rtol=0.04)
+    assert drawn(interval_of(**ENDS | {"a_p": (None, -3.0)})) == []
+    assert len(drawn(None)) == 4000

@@ -143,6 +143,9 @@ class TestCommand:
         assert "- deviation, without p02: infinite partition function: " in result.stdout
         assert "navirl: deviation: infinite partition function" in result.stderr
 
+    def test_a_reach_without_reachable_steps_is_refused(self, navirl):
+        assert "--reach needs --steps reachable." in navirl("models", "demos.json", "--reach", 2, code=2).stderr
+
     def test_one_participant_is_refused(self, navirl, demonstrations):
         alone = [one for one in demonstrations if one.participant == "p01"]
         write_json(Path("one.json"), "demonstrations", demonstrations_document(alone, [], {}), force=False)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from navirl_cli.cli import cli
 from navirl_cli.irl.reward import Reward
 from navirl_cli.planning.paths import Mode, Planner
 from navirl_cli.planning.recommendation import straight_passage
+from navirl_cli.reports import recommendation
 from navirl_cli.reports.plan import plan_warnings
 
 LOG = Path(__file__).parent.parent / "sample_logs" / "p01.mcap"
@@ -139,10 +141,11 @@ def test_a_map_with_start_goal_and_people(folder, tmp_path):
     assert json.loads(run(*words, "--json"))["paths"][0]["min_distance_m"] is None
 
 
-def test_the_figure_and_the_recommendation(scene, tmp_path):
+def test_the_figure_and_the_recommendation(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(recommendation, "DRAWS", 6)
     text = run("plan", *scene, "--recommend", "--plot", tmp_path / "plan.svg")
     assert (tmp_path / "plan.svg").read_text().startswith("<?xml")
-    assert "Pass the person at" in text
+    assert re.search(r"Pass the person at \d\.\d\d m \(95 % interval -?\d\.\d\d to \d\.\d\d m\)", text)
     assert "In this scene:" in text
 
 

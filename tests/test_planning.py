@@ -16,6 +16,7 @@ from navirl_cli.planning.paths import Mode, Planner, measured, rewards_by_term
 from navirl_cli.planning.problem import Problem, problem_of, problem_on
 from navirl_cli.planning.recommendation import recommended, straight_passage
 from navirl_cli.planning.smooth import Limits, smoothed
+from navirl_cli.reports.recommendation import sentences
 
 PAPER = Reward((-54.1, -0.87, -4.91, 1.68))
 RADIUS_M = 0.05
@@ -209,8 +210,12 @@ def test_a_recommendation_says_what_the_paths_of_the_policy_do():
     assert 0 < found.detour_m.value < 1
     assert found.worth_m.value > 0
     assert np.isnan(found.passing_m.lower)
+    assert any("No intervals" in line for line in sentences(found))
     nearer = Reward((-54.1, -0.87, -2.0, 1.68))
-    drawn = recommended(problem, PAPER, [PAPER, nearer])
+    unbounded = Reward((-0.01, 0.0, 0.0, 1.68))
+    drawn = recommended(problem, PAPER, [PAPER, nearer, unbounded])
+    assert (drawn.draws, drawn.lost) == (2, 1)
+    assert "leave out 1 of 3 draws" in sentences(drawn)[-1]
     assert recommended(problem, nearer).passing_m.value < drawn.passing_m.lower < found.passing_m.value
 
 

@@ -192,7 +192,9 @@ def test_a_file_without_valid_iterations_is_refused(navirl, files, change, messa
 
 
 def test_ranks_are_those_of_the_chosen_groups(navirl, files, figure_of):
-    words = ("ranks", files / "demos.json", "--reward", files / "reward.json", "--samples", "50")
+    content = json.loads((files / "reward.json").read_text())
+    Path("force.json").write_text(json.dumps({**content, "demonstrations": ["p01/1"], "groups": ["force, cycle 1"]}))
+    words = ("ranks", files / "demos.json", "--reward", "force.json", "--samples", "50")
     (learnt,) = figure_of(*words).axes
     assert learnt.get_title().startswith("force, cycle 1\nn = 1, p "), "the joystick was not learnt from"
     (other,) = figure_of(*words, "--group", "joystick").axes

@@ -179,8 +179,13 @@ def test_a_demonstration_that_fits_badly_is_named_with_its_ranks():
         *[[37, r] for r in range(19, 9, -1)],
     ]
     one = make.demonstration(SCENE.lattice.grid, far, SCENE.people_m)
-    found = Ranking(tuple(ranks_of([one], TRUTH, 500, np.random.default_rng(0))))
-    line, chance = rank_lines(found)
-    assert line.startswith("p1/1 (force) fits this reward badly: 0.")
+    ranks = tuple(ranks_of([one], TRUTH, 500, np.random.default_rng(0)))
+    line, chance = rank_lines(Ranking(ranks, trained=Trained(frozenset(), frozenset(), frozenset(["force"]))))
+    assert line.startswith("this reward fits p1/1 (force) badly: 0.")
     assert "% pass people nearer" in line
     assert chance == "of 1 demonstrations at most 0.0 would fit as badly by chance"
+    other = Ranking(ranks, trained=Trained(frozenset(), frozenset(), frozenset(["joystick"])))
+    assert rank_lines(other) == ["the reward was not learnt from force: ranks there do not show how well it fits"]
+    assert other.bad == []
+    *_, unknown = rank_lines(Ranking(ranks))
+    assert unknown.startswith("it is unknown from which groups the reward was learnt: ")

@@ -14,7 +14,7 @@ from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps, select
-from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
+from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_unused, reach_warnings
 
 GRID = make.open_grid(20, 9)
 #: A straight path along the middle, and a person above its tenth cell.
@@ -79,6 +79,9 @@ def test_reachable_steps_are_selected_by_the_contacts_or_by_the_stated_reach():
         select([quiet], steps=Steps.REACHABLE)
     with pytest.raises(DemonstrationError, match=r"^`steps` reachable: none of the demonstrations holds a contact or"):
         select([quiet], steps=Steps.REACHABLE, reach_m=0.1)
+    steered = trial(condition=Condition.JOYSTICK, contacts=())
+    everywhere = select([steered], steps=Steps.REACHABLE)
+    assert (everywhere.evidence.steps, everywhere.reach) == (19, None)
 
 
 @pytest.fixture(scope="module")
@@ -137,10 +140,16 @@ def test_a_difference_of_more_than_5_cm_is_a_warning_with_both_numbers():
         "the influence of the reach is unknown: a fit to steps within reach has no policy in a scene"
     ]
     (shown,) = reach_line(effect(0.41, 0.45))
-    assert (
-        "in contact or within reach: 30 of 60 steps. Mean least distance of the policy: 0.41 m from all" in shown.text
-    )
+    assert "in contact or within reach: 30 of 60 steps. Mean least distance of the policy, from" in shown.text
     assert reach_line({}) == []
+
+
+def test_a_stated_reach_that_changes_nothing_is_reported():
+    (line,) = reach_unused({"reach": None, "learnt_from": "all"}, 1.2)
+    assert line.startswith("`reach` has no effect: contact is unknown, ")
+    assert reach_unused({"reach": None, "learnt_from": "all"}, None) == []
+    assert reach_unused({"reach": None, "learnt_from": "reachable"}, 1.2) == []
+    assert reach_unused({**effect(0.4, 0.4), "learnt_from": "all"}, 1.2) == []
 
 
 def test_without_a_wrench_distances_may_be_too_small():

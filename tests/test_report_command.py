@@ -3,6 +3,7 @@
 import json
 import re
 from base64 import b64decode
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.meaning import half_distance_m
+from navirl_cli.reports.reward import in_words
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
 
@@ -46,6 +48,13 @@ def test_it_holds_parameters_and_their_meaning(work, page):
     assert "7 demonstrations of 1 participant, and a navigation reward learnt from 2 of them, of 1 participant." in page
 
 
+def test_it_says_in_front_how_to_drive(page):
+    assert page.index("How to pass people by this reward") < page.index("Parameters</h2>")
+    assert re.search(r"Pass the person at \d\.\d\d m between the robot's shell", page.replace("&#x27;", "'"))
+    assert "No intervals: a parameter has none, or an open one" in page  # a_p has no lower end
+    assert "In the scene of p01/3:" in page
+
+
 def test_it_holds_figures_trials_ranks_and_hashes(work, page):
     assert page.count("data:image/png;base64,") == 4  # paths, policy, properties, profile
     for number in range(1, 8):
@@ -55,6 +64,16 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
     assert "Ranks of demonstrations among the policy" in page
     assert "Not ranked, because the reward was not learnt from such trials: force, cycle 1 (2), joystick (2), " in page
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
+
+
+def test_it_warns_of_starts_aside(work):
+    content = json.loads((work / "reward.json").read_text())
+    content.update(demonstrations=["p01/1", "p01/2"], groups=["force, cycle 1"])
+    first, report = work / "first.json", work / "first.html"
+    first.write_text(json.dumps(content))
+    words = ["report", work / "demos.json", first, "-o", report, "--samples", 10]
+    assert CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False).exit_code == 0
+    assert "<li>All 2 demonstrations are of cycle 1 and start 0." in report.read_text()
 
 
 def test_it_warns_of_uncertain_parameters(page):
@@ -90,3 +109,18 @@ def test_refusals(navirl, work):
     assert "exists already" in navirl(*words, "-o", work / "page.html", code=1).stderr
     swapped = navirl("report", work / "reward.json", work / "demos.json", "-o", "x.html", code=1).stderr
     assert "expected navirl demonstrations" in swapped
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((0.4, 0.9), "0.4 to 0.9"),
+        ((-inf, 0.9), "less than 0.9"),
+        ((0.4, inf), "more than 0.4"),
+        ((6e-35, 0.9), "less than 0.9"),
+        ((6e-35, inf), "the demonstrations set no range"),
+        ((-2.0, 0.9), "-2 to 0.9"),
+    ],
+)
+def test_a_range_in_metres_is_in_words(ends, text):
+    assert in_words(*ends, 0.6) == text

@@ -18,7 +18,7 @@ PACKAGE = Path(navirl_cli.__file__).parent
 #: Rooms whose messages still name options.
 PENDING = {"artefacts", "evaluation", "reports"}
 #: Commands of other tools, which have options of their own.
-OTHER_TOOLS = re.compile(r"rosbags-convert|zstd ")
+OTHER_TOOLS = re.compile(r"rosbags-convert|zstd |--ros-args")
 
 
 @pytest.fixture(scope="module")

@@ -64,6 +64,7 @@ from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.session import MOST_CYCLES
 from navirl_cli.logs.sources import sources_of
 from navirl_cli.parallel import cores
+from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
@@ -362,6 +363,7 @@ def fit(
     notes = (
         *cannot_learn(selected.demonstrations),
         *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
+        *reach_unused(document, reach_m),
         *fit_warnings(document),
     )
     reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}

@@ -15,7 +15,7 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.schema import first_problem, shown
 from navirl_cli.artefacts.versions import VERSION, is_known, upgraded
 from navirl_cli.errors import ArtefactError, brief
-from navirl_cli.files import replacing
+from navirl_cli.files import read_regular, replacing
 
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
@@ -52,7 +52,7 @@ def read_json(path: Path, artefact: str) -> dict[str, Any]:
         ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
     try:
-        document = _parsed(path.read_text(encoding="utf-8"))
+        document = _parsed(read_regular(path).decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:

@@ -40,6 +40,7 @@ from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 
 
@@ -211,7 +212,7 @@ def fit(
     else:
         echo(to_text(report(document)))
     notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
-    for line in (*notes, *warnings(document, status=False)):
+    for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
         say(line)
     finish(lost)
 

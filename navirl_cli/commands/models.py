@@ -63,6 +63,8 @@ def models(
 
     Each model is fitted to all participants but one and predicts the steps of that one, for each participant in turn.
     """
+    if reach is not None and Steps(steps) is not Steps.REACHABLE:
+        raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
         demonstrations_in(demos),
         conditions=conditions,

@@ -34,6 +34,13 @@ person_option = click.option(
     shell_complete=completion.persons,
     help="Take this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
 )
+#: The same beside positions of people, which --person names there.
+person_name_option = click.option(
+    "--person-name",
+    metavar="NAME",
+    shell_complete=completion.persons,
+    help="Drive by this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
+)
 logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=FilePath)
 topic_option = click.option(
     "--topic",

@@ -28,6 +28,8 @@ _NUMBER: IntArray = np.array([[5, 4, 3], [6, -1, 2], [7, 0, 1]], dtype=np.int64)
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 0.01, 2.0
 #: Maps of more cells do not fit into memory with what is computed on them.
 MOST_CELLS = 50_000_000
+#: Cells on which distances are computed at once: they and what is computed on them stay in the processor's cache.
+_BLOCK_CELLS = 1 << 16
 #: map_server's default: an occupancy of 65 % and more is an obstacle.
 OCCUPIED_FROM = 65
 #: A costmap marks cells within the robot's inscribed radius 99 and obstacles themselves 100.
@@ -190,11 +192,15 @@ def _grown(occupied: BoolArray, resolution_m: float, radius_m: float) -> BoolArr
     distance transform over a map as long as the radius spans few cells, and needs no import of scipy.ndimage.
     """
     rows, columns = occupied.shape
-    here = np.arange(columns, dtype=np.int64)
-    left = np.maximum.accumulate(np.where(occupied, here, -columns), axis=1)
-    right = np.minimum.accumulate(np.where(occupied, here, 2 * columns)[:, ::-1], axis=1)[:, ::-1]
-    away = np.minimum(here - left, right - here)
     reach = np.arange(ceil(radius_m / resolution_m) + 1)
+    away = np.empty(occupied.shape, dtype=np.int32)
+    here = np.arange(columns, dtype=np.int32)
+    block = max(1, _BLOCK_CELLS // max(columns, 1))
+    for begin in range(0, rows, block):
+        part = occupied[begin : begin + block]
+        left = np.maximum.accumulate(np.where(part, here, np.int32(-columns)), axis=1)
+        right = np.minimum.accumulate(np.where(part, here, np.int32(2 * columns))[:, ::-1], axis=1)[:, ::-1]
+        np.minimum(here - left, right - here, out=away[begin : begin + block])
     grown = occupied.copy()
     for apart in reach[: min(len(reach), rows)].tolist():
         width = np.count_nonzero(np.sqrt(reach**2 + apart**2) * resolution_m < radius_m)

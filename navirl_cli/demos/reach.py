@@ -1,6 +1,6 @@
 """How far a person reaches, and which steps of a path they could have changed by a push."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,14 +90,14 @@ def reach_unknown(demonstrations: Iterable[Demonstration]) -> list[str]:
     return [one.id for one in demonstrations if one.contacts is None and one.condition is not Condition.JOYSTICK]
 
 
-def required_reach(demonstrations: Iterable[Demonstration], reach_m: float | None) -> Reach:
-    """The stated reach, or that of the contacts.
+def required_reach(demonstrations: Sequence[Demonstration], reach_m: float | None) -> Reach | None:
+    """The stated reach, or that of the contacts; None where a joystick steered all demonstrations and none is needed.
 
     Raises:
         DemonstrationError: No reach is stated, and no contact with people in the scene shows one.
     """
     found = reach_of(demonstrations) if reach_m is None else Reach(reach_m)
-    if found is None:
+    if found is None and any(one.condition is not Condition.JOYSTICK for one in demonstrations):
         raise DemonstrationError(
             "`steps` reachable: expected contacts in a scene with people, which show the reach, found none; "
             "state the reach with `reach`, or learn from all steps"

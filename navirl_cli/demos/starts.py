@@ -24,8 +24,9 @@ def starts_aside_m(chosen: Sequence[Demonstration], everyone: Sequence[Demonstra
             starts.
 
     Returns:
-        The distance from these places to the nearest of the chosen starts, square to the way to the goal, m, the median
-        over the places; None where the chosen ones are not of a first cycle only, or where it is at most ASIDE_M.
+        The distance from these places to the nearest of the chosen starts, perpendicular to the line from the place to
+        its goal, m, the median over the places; None where the chosen ones are not of a first cycle only, or where it
+        is at most ASIDE_M.
     """
     if not chosen or any(one.cycle != _FIRST for one in chosen):
         return None

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from navirl_cli.documents.tables import FORMULA
 from navirl_cli.errors import ArtefactError, brief
+from navirl_cli.files import read_regular
 
 #: Spreadsheets choose the separator by the language.
 SEPARATORS = ",;\t"
@@ -62,7 +63,7 @@ def read_sheet(path: Path, columns: Sequence[str], needed: Sequence[str], rows: 
 def _text(path: Path) -> str:
     """The text of a UTF-8 file."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise ArtefactError(f"{path}: expected a CSV file, cannot be read: {error.strerror}; check the path") from error
     try:

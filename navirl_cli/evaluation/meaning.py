@@ -1,7 +1,7 @@
 """What a learnt reward means in metres: the reach of personal space, and the detours that the model accepts."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import exp, inf, isfinite, isinf, log, nan, pi, sqrt
 
@@ -98,7 +98,7 @@ def meanings(
     names = [parameter.name for parameter in reward.parameters]
     estimate = dict(zip(names, reward.theta, strict=True))
     ends = _ends(reward, covariance, intervals)
-    draws, beyond = _draws(reward, covariance, ends, rng)
+    draws, beyond = _draws(reward, covariance, ends, DRAWS, rng)
     found = []
     for text, unit, on, value in _quantities(resolution_m, distance_m):
         if not set(on) <= set(names):
@@ -110,6 +110,28 @@ def meanings(
             lower, upper = _quantiles(drawn, endless, value(estimate))
         found.append(Meaning(text, unit, value(estimate), lower, upper))
     return found
+
+
+def drawn_rewards(
+    reward: Reward, covariance: FloatArray, intervals: Intervals | None, count: int, rng: np.random.Generator
+) -> list[Reward]:
+    """Rewards drawn from the distribution of an estimate, for intervals of whatever follows from a reward.
+
+    Args:
+        reward: The estimate.
+        covariance: (k, k), NaN for parameters without a variance.
+        intervals: Of the parameters; by default from the covariance.
+        count: Number of draws.
+        rng: Source of randomness.
+
+    Returns:
+        The draws; none where they say nothing, because a parameter has no interval or an open one.
+    """
+    ends = _ends(reward, covariance, intervals)
+    if not all(parameter.name in ends and np.isfinite(ends[parameter.name]).all() for parameter in reward.parameters):
+        return []
+    draws, _ = _draws(reward, covariance, ends, count, rng)
+    return [replace(reward, theta=tuple(row)) for row in draws.tolist()]
 
 
 def _quantiles(drawn: FloatArray, endless: BoolArray, estimate: float) -> tuple[float, float]:
@@ -174,17 +196,21 @@ def _ends(reward: Reward, covariance: FloatArray, intervals: Intervals | None) -
 
 
 def _draws(
-    reward: Reward, covariance: FloatArray, ends: Mapping[str, tuple[float, float]], rng: np.random.Generator
+    reward: Reward,
+    covariance: FloatArray,
+    ends: Mapping[str, tuple[float, float]],
+    count: int,
+    rng: np.random.Generator,
 ) -> tuple[FloatArray, BoolArray]:
-    """(DRAWS, k) parameters whose 95 % intervals are those given, with the correlations of the estimate.
+    """(count, k) parameters whose 95 % intervals are those given, with the correlations of the estimate.
 
     Each side of a parameter is half a normal distribution; the decay and what cannot change its sign have it on a
-    logarithm. (DRAWS, k) whether a draw lies towards an open end; it has the value of the parameter's bound.
+    logarithm. (count, k) whether a draw lies towards an open end; it has the value of the parameter's bound.
     """
-    theta, beyond = np.tile(reward.theta, (DRAWS, 1)), np.zeros((DRAWS, len(reward.theta)), dtype=bool)
+    theta, beyond = np.tile(reward.theta, (count, 1)), np.zeros((count, len(reward.theta)), dtype=bool)
     matrix = np.nan_to_num(correlation(covariance))
     np.fill_diagonal(matrix, 1.0)
-    normal = rng.multivariate_normal(np.zeros(len(theta[0])), matrix, DRAWS, method="eigh") / WIDTH
+    normal = rng.multivariate_normal(np.zeros(len(theta[0])), matrix, count, method="eigh") / WIDTH
     for j, parameter in enumerate(reward.parameters):
         if parameter.name not in ends:
             continue

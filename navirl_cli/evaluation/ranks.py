@@ -106,6 +106,19 @@ class Ranking:
 
     ranks: tuple[Rank, ...] = ()
     not_ranked: Mapping[str, int] = field(default_factory=dict)
+    #: What the reward was learnt from; None where that is unknown.
+    trained: Trained | None = None
+
+    @property
+    def unlike(self) -> list[str]:
+        """Groups that were ranked although the reward was not learnt from them."""
+        known = None if self.trained is None else self.trained.groups
+        return [] if known is None else sorted({one.group for one in self.ranks} - known)
+
+    @property
+    def bad(self) -> list[Rank]:
+        """Those that fit badly, of groups that the reward was learnt from."""
+        return [one for one in self.ranks if one.fits_badly and one.group not in self.unlike]
 
 
 def ranking(
@@ -117,7 +130,7 @@ def ranking(
 ) -> Ranking:
     """Rank the demonstrations of the groups that a reward was learnt from; arguments as of :func:`ranks_of`."""
     chosen, others = chosen_to_rank(demonstrations, trained)
-    return Ranking(tuple(ranks_of(chosen, reward, samples, rng, trained=trained)), others)
+    return Ranking(tuple(ranks_of(chosen, reward, samples, rng, trained=trained)), others, trained)
 
 
 def ranks_of(

@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.cells import distances_to
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
@@ -28,12 +29,14 @@ from navirl_cli.planning.recommendation import straight_passage
 
 #: The most that a free cell may cost; 253 and 254 are obstacles.
 MOST_COST: Final = 252
-#: What a mask's occupancy of 99 becomes: 100 is an obstacle.
+#: KeepoutFilter makes 2.54 of one per cent of a mask's occupancy; 100 per cent is an obstacle.
+COST_PER_PERCENT, MOST_PERCENT = 2.54, 99
+#: What 99 per cent becomes.
 MOST_MASK_COST: Final = 251
 #: Terms about people, one of which a reward needs, and the others that it may have.
 SPACES, LINE = frozenset({"personal-space", "length-space"}), frozenset({"length", "deviation"})
-#: Factors of the people's part that are tried, from the reward's own on.
-_FACTORS: Final = np.geomspace(1.0, 8.0, 43)
+#: Factors of the people's part that are tried.
+_FACTORS: Final = np.geomspace(0.1, 8.0, 77)
 #: Largest cost_travel_multiplier that is written.
 _MOST_MULTIPLIER: Final = 8.0
 
@@ -129,6 +132,26 @@ class CostModel:
         return self.people_factor * self.planner.amplitude * self._space[0] / self.cell_reward
 
     @property
+    def peak(self) -> float:
+        """Cost that is most that one person causes, as far as a mask holds it."""
+        return min(max(self.amplitude, 0.0), MOST_MASK_COST)
+
+    def person_m(self, share: float) -> float:
+        """Distance at which a person's cost has fallen to a share of that at the person's place, m."""
+        return float(np.sqrt(-2 * self.covariance_m2 * np.log(share)))
+
+    @property
+    def flat_within_m(self) -> float:
+        """Distance from a person within which all costs are the cap, m; 0 where none is."""
+        return self.person_m(MOST_MASK_COST / self.amplitude) if self.amplitude > MOST_MASK_COST else 0.0
+
+    @property
+    def line_flat_beyond_m(self) -> float:
+        """Distance from the nominal path from which on all costs are the cap, m; infinite without such a term."""
+        per_square = float(self.off_the_line(np.array(1.0)))
+        return float(np.sqrt(MOST_MASK_COST / per_square)) if per_square > 0 else float("inf")
+
+    @property
     def covariance_m2(self) -> float:
         """Of the Gaussian around a person: sigma_p d^2 = d^2 / (2 covariance)."""
         return 1 / (2 * self._space[1])
@@ -152,16 +175,50 @@ class CostModel:
         costs: FloatArray = self.planner.amplitude * a_g * deviation_m**2 / self.cell_reward
         return np.maximum(costs, 0.0)
 
-    def on(self, scene: Scene, *, deviation: bool) -> FloatArray:
-        """(n,) costs of the states of a scene, before any cap.
+    def over(self, scene: Scene, *, people: bool = True, line: bool = True) -> FloatArray:
+        """(rows, columns) costs of all cells of a scene's map, before any cap; row 0 has the lowest y.
 
         Args:
             scene: The scene.
-            deviation: Whether the distance from the nominal path counts.
+            people: Whether people count.
+            line: Whether the distance from the nominal path counts.
         """
-        away = np.hypot(*np.moveaxis(scene.lattice.xy_m[:, None] - scene.people_m[None], -1, 0))
-        costs = np.maximum(self.near_people(away), 0.0)
-        return costs + self.off_the_line(scene.deviation_m) if deviation else costs
+        costs = np.zeros(scene.lattice.grid.shape)
+        if people:
+            costs += np.maximum(self.near_people(away_from_people_m(scene)), 0.0)
+        if line:
+            nominal = np.zeros(costs.shape, dtype=bool)
+            columns, rows = scene.lattice.cells.T
+            nominal[rows, columns] = scene.nominal
+            costs += self.off_the_line(distances_to(nominal) * scene.lattice.grid.resolution_m)
+        return costs
+
+    def on(self, scene: Scene, *, people: bool = True, line: bool = True) -> FloatArray:
+        """(n,) the same by state."""
+        columns, rows = scene.lattice.cells.T
+        costs: FloatArray = self.over(scene, people=people, line=line)[rows, columns]
+        return costs
+
+
+def percent_of(costs: FloatArray) -> FloatArray:
+    """(...) the occupancies of a mask whose costs are nearest, whole per cent, capped below an obstacle."""
+    percent: FloatArray = np.clip(np.round(costs / COST_PER_PERCENT), 0, MOST_PERCENT)
+    return percent
+
+
+def mask_costs(costs: FloatArray) -> FloatArray:
+    """(...) what KeepoutFilter makes of costs that went through a mask."""
+    rounded: FloatArray = np.round(COST_PER_PERCENT * percent_of(costs))
+    return rounded
+
+
+def away_from_people_m(scene: Scene) -> FloatArray:
+    """(rows, columns, p) distance of every cell's centre from each person, m."""
+    grid = scene.lattice.grid
+    rows, columns = np.indices(grid.shape)
+    centres = grid.centres_of(np.stack([columns, rows], axis=-1))
+    away: FloatArray = np.hypot(*np.moveaxis(centres[..., None, :] - scene.people_m, -1, 0))
+    return away
 
 
 def planner_for(name: str, reward: Reward, resolution_m: float, people_factor: float = 1.0) -> PlannerCosts:
@@ -179,30 +236,57 @@ def planner_for(name: str, reward: Reward, resolution_m: float, people_factor: f
     return smac2d(float(np.clip(np.ceil(2 * amplitude / MOST_MASK_COST) / 2, 1.0, _MOST_MULTIPLIER)))
 
 
-def matched(name: str, reward: Reward, resolution_m: float, robot_radius_m: float) -> CostModel:
-    """Costs with which a planner passes a person as far away as paths of the policy do on average.
+@dataclass(frozen=True, eq=False)
+class Passing:
+    """How a planner passes a person who stands on the robot's straight line, on open ground."""
 
-    The factor is found in the scene of a person who stands on the robot's straight line, on open ground.
+    model: CostModel
+    #: Mean over paths of the policy, between the robot's shell and the person's centre, m.
+    policy_m: float
+    #: The planner's path, m.
+    planner_m: float
+
+
+def matched(
+    name: str,
+    reward: Reward,
+    resolution_m: float,
+    robot_radius_m: float,
+    factor: float | None = None,
+    *,
+    line: bool = False,
+    costs: PlannerCosts | None = None,
+) -> Passing:
+    """Costs with which a planner passes a person as far away as paths of the policy do on average, or a little farther.
+
+    The person is no obstacle here: the costs alone keep the planner away. With the cost off the line it passes at any
+    distance; without, the path of least cost leads through the person or passes at a distance of its own.
 
     Args:
         name: "navfn" or "smac2d".
         reward: To be driven.
         resolution_m: Of its cells, m.
         robot_radius_m: Of the robot, m.
+        factor: Of the costs near people, in place of the one that matches best.
+        line: Whether the planner also pays for the distance from the nominal path.
+        costs: What the planner pays, if that is chosen already.
 
     Raises:
-        InfinitePartitionError: The reward has no policy there.
+        RewardError: Costs cannot hold the reward, or it has no policy.
     """
+    factors = _FACTORS.tolist() if factor is None else [factor]
+    models = [
+        CostModel(reward, costs or planner_for(name, reward, resolution_m, one), resolution_m, one) for one in factors
+    ]
     problem = straight_passage(robot_radius_m, resolution_m)
     wanted, _ = Planner(problem, reward).passing_m
-    models = [CostModel(reward, planner_for(name, reward, resolution_m, f), resolution_m, f) for f in _FACTORS.tolist()]
-    apart = [abs(passing_m(one, problem) - wanted) for one in models]
-    return models[int(np.argmin(apart))]
+    found = [Passing(one, wanted, passing_m(one, problem, line=line)) for one in models]
+    # a path past people before any that leads through them
+    return min(found, key=lambda one: (one.planner_m <= 0, abs(one.planner_m - wanted)))
 
 
-def passing_m(model: CostModel, problem: Problem) -> float:
+def passing_m(model: CostModel, problem: Problem, *, line: bool) -> float:
     """Least distance between shell and people of a planner's path in a scene, m."""
     scene = problem.scene
-    costs = np.minimum(model.on(scene, deviation=True), MOST_COST)
-    path = model.planner.path(scene, costs)
+    path = model.planner.path(scene, mask_costs(model.on(scene, line=line)))
     return float(measured(problem, scene.lattice.xy_m[path]).min_distance_m[0])

@@ -2,63 +2,56 @@
 
 Values are occupancies: 0 to 100, above that unknown (nav2_map_server/src/map_io.cpp). The default mode, trinary, would
 make three values of all. KeepoutFilter turns an occupancy into a cost of 2.54 times as much, and 100 into an obstacle.
-SpeedFilter of type 1 reads a percentage of the speed limit; 0 is no limit.
+SpeedFilter of type 1 limits the speed to base + multiplier x value per cent; Nav2's own parameters are 100 and -1, and
+0 is no limit. It refuses unknown cells.
 """
 
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.grid import Grid
+from navirl_cli.export.costs import percent_of
 from navirl_cli.files import replacing
-from navirl_cli.irl.scene import Scene
 
 #: A pixel above 100 is unknown.
 UNKNOWN: Final = 255
-#: Cost of an occupancy of one per cent, and the most that is no obstacle.
-COST_PER_PERCENT, MOST_PERCENT = 2.54, 99
 
 
-def occupancy_of(costs: FloatArray) -> np.ndarray:
+def occupancy_of(costs: FloatArray) -> NDArray[np.uint8]:
     """The mask's occupancy whose cost is nearest to each cost, capped below an obstacle.
 
     Args:
         costs: (...) 0 and more.
 
     Returns:
-        (...) whole numbers 0 to 99, uint8.
+        (...) whole numbers 1 to 99, and UNKNOWN where there is no cost: there KeepoutFilter leaves the costmap alone,
+        while a 0 would make unknown cells free.
     """
-    return np.clip(np.round(costs / COST_PER_PERCENT), 0, MOST_PERCENT).astype(np.uint8)
+    occupancy = percent_of(costs).astype(np.uint8)
+    return np.where(occupancy == 0, np.uint8(UNKNOWN), occupancy)
 
 
-def over_map(scene: Scene, by_state: np.ndarray, elsewhere: int = 0) -> np.ndarray:
-    """Values by state over the map, (rows, columns) uint8; row 0 has the lowest y."""
-    over = np.full(scene.lattice.grid.shape, elsewhere, dtype=np.uint8)
-    columns, rows = scene.lattice.cells.T
-    over[rows, columns] = by_state
-    return over
-
-
-def speed_percent(away_m: FloatArray, near_m: float, far_m: float, least_percent: float) -> np.ndarray:
-    """A speed limit that falls towards people.
+def slowing(away_m: FloatArray, near_m: float, far_m: float, least_percent: float) -> NDArray[np.uint8]:
+    """By how much the robot slows down towards people.
 
     Args:
-        away_m: (...) distance between the robot's shell and the nearest person's centre, m.
-        near_m: From here on inward the limit is the least.
-        far_m: From here on outward there is no limit (0).
-        least_percent: Per cent of the full speed.
+        away_m: (...) distance between the robot's centre and the nearest person's, m.
+        near_m: From here on inward the speed is the least.
+        far_m: From here on outward there is no limit.
+        least_percent: Of the full speed, 1 to 100.
 
     Returns:
-        (...) per cent, uint8.
+        (...) 100 - the limit in per cent, 0 to 99; 0 is no limit.
     """
-    share = np.clip((away_m - near_m) / max(far_m - near_m, 1e-9), 0.0, 1.0)
-    percent = np.round(least_percent + (100 - least_percent) * share)
-    return np.where(share >= 1.0, 0, percent).astype(np.uint8)
+    share = np.clip((far_m - away_m) / max(far_m - near_m, 1e-9), 0.0, 1.0)
+    return np.round((100 - max(least_percent, 1.0)) * share).astype(np.uint8)
 
 
-def write_mask(yaml: Path, occupancy: np.ndarray, grid: Grid, *, force: bool) -> None:
+def write_mask(yaml: Path, occupancy: NDArray[np.uint8], grid: Grid, *, force: bool) -> None:
     """Write a mask as YAML and, beside it, a pgm of the same name.
 
     Args:

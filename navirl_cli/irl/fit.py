@@ -1,7 +1,7 @@
 """Maximum-entropy inverse reinforcement learning: the parameters under which the demonstrations are most likely."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -65,6 +65,8 @@ class Fit(ByContent):
     path_log_likelihood: FloatArray
     #: (k,) bias that was subtracted, in the parameters' units; None without a correction.
     bias: FloatArray | None = None
+    #: (i, k) places on the profiles that the search for other maxima followed, in the parameters' units.
+    scanned: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -146,11 +148,13 @@ def fit(
             progress(steps, value)
 
     free = influential & ~held
+    scanned: list[Point] = []
     if method is Method.ADAM:
         found = _by_adam(objective, first, free, count)
     else:
-        found = _by_newton(objective, first, free, scan, count)
-    return _as_fit(objective, found, first, influential, held, (method, l2, prior))
+        found, scanned = _by_newton(objective, first, free, scan, count)
+    ended = _as_fit(objective, found, first, influential, held, (method, l2, prior))
+    return replace(ended, scanned=np.array([point.x * objective.scale for point in scanned]))
 
 
 def _as_fit(
@@ -209,14 +213,18 @@ def _as_fit(
 
 def _by_newton(
     objective: Objective, first: Point, free: NDArray[np.bool_], scan: bool, count: Callable[[float], None]
-) -> Maximum:
-    """The highest maximum found from the start and along the profiles of the parameters that enter non-linearly."""
+) -> tuple[Maximum, list[Point]]:
+    """The highest maximum found from the start and along the profiles of the parameters that enter non-linearly.
+
+    Returns:
+        The maximum, and the places on the profiles.
+    """
     search = Scan(objective, objective.bounds, free, count, [maximise(objective, first, objective.bounds, free, count)])
     if scan:
         search.over([(j, values) for j, values in objective.scans() if free[j]])
     # Of maxima that differ by rounding only, take that of the given start.
     top = search.top.value
-    return next(maximum for maximum in search.found if maximum.best.value >= top - 1e-9)
+    return next(maximum for maximum in search.found if maximum.best.value >= top - 1e-9), search.visited
 
 
 def _by_adam(objective: Objective, first: Point, free: NDArray[np.bool_], count: Callable[[float], None]) -> Maximum:

@@ -65,6 +65,8 @@ class Effort:
     most: int = field(default_factory=lambda: MAX_ITERATIONS)
     #: A predicted gain below which it has converged, nats.
     enough: float = GAIN_TOLERANCE
+    #: Whether it begins with long strides, as in a climb after a step along a ridge that is often flat.
+    strides: bool = False
 
 
 def maximise(
@@ -94,11 +96,11 @@ def maximise(
         The maximum and the accepted places before it.
     """
     lower, upper = bounds
+    effort = effort or Effort()
     here, path, radius = start, [start], FIRST_RADIUS if not known and hope is None else AGAIN_RADIUS
-    if hope is not None:
+    if hope is not None or effort.strides:
         radius = max(radius, WIDE * float(np.linalg.norm(start.x)))  # a concave climb may take strides
     converged = blocked = False
-    effort = effort or Effort()
     while len(path) <= effort.most and radius > MIN_RADIUS:
         if any(_bound_for(here, top, bounds, free) for top in known):
             break

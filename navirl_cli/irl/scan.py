@@ -45,6 +45,10 @@ class Scan:
     found: list[Maximum]
     #: How far below the best place a value of the profile is still of interest, nats.
     fall: float = 0.0
+    #: Places to begin at where the profile is followed through their value of the variable.
+    starts: Sequence[FloatArray] = ()
+    #: Places found on profiles.
+    visited: list[Point] = field(default_factory=list, init=False)
     _seen: dict[float, _Place] = field(default_factory=dict, init=False)
 
     @property
@@ -95,11 +99,13 @@ class Scan:
         others = self.free & (np.arange(len(last.x)) != j)
         # Along the logarithm of the variable the best of the others moves more evenly.
         x = moved(last, j, float(last.x[j] * np.log(value / last.x[j])), self.bounds, others)
+        x = next((start for start in self.starts if np.isclose(start[j], value, rtol=1e-12)), x)
         begin = self.objective(np.where(np.arange(len(x)) == j, value, x))
         if not np.isfinite(begin.value):
             begin = self.objective(np.where(np.arange(len(x)) == j, value, last.x))
         if np.isfinite(begin.value):
             point = maximise(self.objective, begin, self.bounds, others, hope=self.top.value - self.fall).best
+            self.visited.append(point)
             self._seen[value] = _Place(point, float(point.gradient[j]) * value)
 
     def _climb(self, j: int) -> None:

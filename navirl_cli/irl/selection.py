@@ -99,7 +99,7 @@ def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | N
         chosen, masks = _with_some(chosen, [steps_in_contact(one) for one in chosen], "contact", "a contact")
     elif chosen and steps is Steps.REACHABLE:
         reach = required_reach(chosen, reach_m)
-        within = [steps_within_reach(one, reach.reach_m) for one in chosen]
+        within = [steps_within_reach(one, reach.reach_m if reach else 0.0) for one in chosen]
         chosen, masks = _with_some(chosen, within, "reachable", "a contact or comes within reach of a person")
     evidence = evidence_of(chosen)
     return Selection(

@@ -3,6 +3,7 @@
 The meaning of colours is that of nav2_map_server (ros-navigation/navigation2, nav2_map_server/src/map_io.cpp).
 """
 
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navirl_cli.errors import LogError, brief
+from navirl_cli.files import open_regular
+from navirl_cli.limits import REMEDY, Allowance
 from navirl_cli.logs.map_geometry import LEAST_M, MOST_M, check_geometry, is_place, is_resolution
 from navirl_cli.logs.recording import Occupancy
 from navirl_cli.logs.yaml_file import read_mapping
@@ -104,11 +107,18 @@ def _picture(path: Path, name: str, colours: _Colours) -> _Cells:
     from PIL import Image, UnidentifiedImageError
 
     file = path.parent / name
+    allowance = Allowance()
     expected = f"{path}: key image: expected a pgm, png or bmp file, found"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(file, formats=_FORMATS) as image:
+            with open_regular(file) as stream, Image.open(stream, formats=_FORMATS) as image:
+                most = allowance.most(os.fstat(stream.fileno()).st_size)
+                if image.width * image.height > most:
+                    raise LogError(
+                        f"{expected} {file} of {image.width} x {image.height} cells, expected at most {most} for its "
+                        f"size; {REMEDY}"
+                    )
                 light, alpha, full = _light(image)
     except FileNotFoundError as error:
         raise LogError(f"{expected} no file {file}; put it there or correct the key") from error

@@ -1,9 +1,15 @@
 """YAML files that other programs write."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from navirl_cli.errors import LogError, brief
+from navirl_cli.files import open_regular
+from navirl_cli.limits import in_mb, lifted
+
+#: Size of a file, levels of nesting, and anchors, beyond what rosbag2 and Nav2 write.
+_MOST_BYTES: Final = 8 << 20
+_DEEPEST, _MOST_ANCHORS = 40, 100
 
 
 def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
@@ -24,7 +30,10 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
 
     expected = f"{path}: expected YAML with keys and values, found"
     try:
-        document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        text = _text(path)
+        if not lifted():
+            _check_structure(text)
+        document = YAML(typ="safe", pure=True).load(text)
     except OSError as error:
         raise LogError(f"{path}: expected a YAML file, found: {error.strerror}; {remedy}") from error
     # ruamel also raises the errors of int(), datetime() and deep nesting
@@ -35,6 +44,40 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
     if not isinstance(document, dict):
         raise LogError(f"{expected} {brief(document)}; {remedy}")
     return document
+
+
+def _text(path: Path) -> str:
+    """The text of a file that is not larger than such files are.
+
+    Raises:
+        OSError, ValueError: It cannot be read, is too large, or is not UTF-8.
+    """
+    with open_regular(path) as file:
+        data = file.read(-1 if lifted() else _MOST_BYTES + 1)
+    if len(data) > _MOST_BYTES and not lifted():
+        raise ValueError(f"more than {in_mb(_MOST_BYTES)}")
+    return data.decode("utf-8")
+
+
+def _check_structure(text: str) -> None:
+    """Refuse what takes more time or memory than its size, before a document is built.
+
+    Raises:
+        YAMLError, ValueError: It does not parse, has aliases, whose copies can grow without end, or is nested deeply.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, NodeEvent
+
+    depth = anchors = 0
+    for event in YAML(typ="safe", pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        anchors += isinstance(event, NodeEvent) and event.anchor is not None
+        if isinstance(event, AliasEvent):
+            raise ValueError(f"line {event.start_mark.line + 1}: an alias (*{str(event.anchor)[:20]}); write it out")  # noqa: TRY004
+        if depth > _DEEPEST:
+            raise ValueError(f"line {event.start_mark.line + 1}: more than {_DEEPEST} levels of nesting")
+        if anchors > _MOST_ANCHORS:
+            raise ValueError(f"line {event.start_mark.line + 1}: more than {_MOST_ANCHORS} anchors")
 
 
 def _problem(error: Exception) -> str:

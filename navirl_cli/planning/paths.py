@@ -5,6 +5,7 @@ of the policy lead around. So the bodies of people are obstacles here, and nothi
 probability that the policy gives it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -176,16 +177,29 @@ def rewards_by_term(problem: Problem, reward: Reward, states: IntArray) -> dict[
         reward: The reward.
         states: (k,) from start to goal.
     """
+    return {term.name: total[0] for term, total in zip(reward.terms, _sums(problem, reward, [states]), strict=True)}
+
+
+def rewards_of_people(problem: Problem, reward: Reward, paths: Sequence[IntArray]) -> FloatArray:
+    """(m,) the part of each path's reward that people cause, nats; the paths each (k,) from start to goal."""
+    total = np.zeros(len(paths))
+    for term, sums in zip(reward.terms, _sums(problem, reward, paths), strict=True):
+        if term.about_people:
+            total += sums
+    return total
+
+
+def _sums(problem: Problem, reward: Reward, paths: Sequence[IntArray]) -> list[list[float]]:
+    """The sums of every term along each path, nats."""
     scene = problem.scene
-    moves = moves_along(scene.lattice.cells[states])
     graph = reward.ordering(scene).graph
-    along = graph.along(states, moves)[:-1]
-    found: dict[str, float] = {}
-    at = 0
+    moves = [moves_along(scene.lattice.cells[states]) for states in paths]
+    along = [graph.along(states, own)[:-1] for states, own in zip(paths, moves, strict=True)]
+    found, at = [], 0
     for term in reward.terms:
         count = len(term.parameters)
         value = term.on(scene, reward.theta[at : at + count]).value
         full = np.broadcast_to(graph.on_states(value), (graph.size, 8))
-        found[term.name] = float(full[along, moves].sum())
+        found.append([float(full[left, own].sum()) for left, own in zip(along, moves, strict=True)])
         at += count
     return found

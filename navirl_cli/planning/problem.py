@@ -41,6 +41,8 @@ class Problem:
     start_yaw_rad: float | None = None
     #: Name of the map's frame.
     frame: str = MAP_FRAME
+    #: When the scene was seen, ns on the clock of its log; 0 for a map.
+    t_ns: int = 0
 
     @property
     def nominal_states(self) -> IntArray:
@@ -101,7 +103,15 @@ def problem_of(demonstration: Demonstration) -> Problem:
     scene = scenes_of([demonstration])[0]
     nominal = scene.nominal_line_m() if demonstration.nominal_m is None else demonstration.nominal_m
     (x0, y0), (x1, y1) = demonstration.xy_m[[0, -1]].tolist()
-    return Problem(scene, (x0, y0), (x1, y1), nominal, demonstration.robot_radius_m, float(demonstration.yaw_rad[0]))
+    return Problem(
+        scene,
+        (x0, y0),
+        (x1, y1),
+        nominal,
+        demonstration.robot_radius_m,
+        float(demonstration.yaw_rad[0]),
+        t_ns=demonstration.start_ns,
+    )
 
 
 @dataclass(frozen=True)
@@ -113,6 +123,8 @@ class Seen:
     people_m: tuple[Point, ...]
     #: The latest goal that was announced until then; None without one.
     goal_m: Point | None
+    #: The instant, ns on the log's clock.
+    t_ns: int
 
 
 def seen_at(recording: Recording, at_s: float | None) -> Seen:
@@ -145,6 +157,7 @@ def seen_at(recording: Recording, at_s: float | None) -> Seen:
         yaw_rad=float(recording.yaw_rad[row]),
         people_m=tuple((x, y) for x, y in people),
         goal_m=None if goal is None else (goal[0], goal[1]),
+        t_ns=t_ns,
     )
 
 

@@ -6,14 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.grid import Grid
 from navirl_cli.demos.lines import path_length_m
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.policy_paths import PolicyLines, Steps
 from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.reward import Reward
-from navirl_cli.planning.paths import Mode, Planner, rewards_by_term
+from navirl_cli.planning.paths import Mode, Planner, rewards_of_people
 from navirl_cli.planning.problem import Problem, problem_on
 from navirl_cli.planning.smooth import Limits, smoothed
 
@@ -49,6 +49,9 @@ class Recommendation:
     worth_m: Quantity
     #: 95 of 100 paths keep at least this distance between the robot's shell and a person's centre, m.
     least_m: Quantity
+    #: Draws from the estimate that have a policy in the scene, and those that have none.
+    draws: int = 0
+    lost: int = 0
 
 
 def straight_passage(robot_radius_m: float, resolution_m: float) -> Problem:
@@ -82,7 +85,8 @@ def recommended(problem: Problem, reward: Reward, draws: Sequence[Reward] = ()) 
     edges = np.full((2, len(value)), np.nan)
     if spread:
         edges = np.nanquantile(np.array(spread), [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-    return Recommendation(*(Quantity(*map(float, one)) for one in zip(value, *edges, strict=True)))
+    passing, onset, detour, worth, least = (Quantity(*map(float, one)) for one in zip(value, *edges, strict=True))
+    return Recommendation(passing, onset, detour, worth, least, len(spread), len(draws) - len(spread))
 
 
 def _means(problem: Problem, reward: Reward) -> FloatArray:
@@ -97,8 +101,8 @@ def _means(problem: Problem, reward: Reward) -> FloatArray:
     # drawn paths are jagged, so that their lengths say little
     ridge = planner.plan(Mode.EXPECTED)[0].line_m
     typical = smoothed(problem, ridge, scene.lattice.grid.resolution_m, Limits())
-    people = [_of_people(problem, reward, drawn.path(number)) for number in range(len(drawn))]
-    saved = float(np.mean(people)) - _of_people(problem, reward, nominal)
+    people = rewards_of_people(problem, reward, [nominal, *(drawn.path(number) for number in range(len(drawn)))])
+    saved = float(people[1:].mean() - people[0])
     names = [parameter.name for parameter in reward.parameters]
     # Without a cost of path length no detour costs as much.
     per_metre = -reward.theta[names.index("c0")] if "c0" in names else np.nan
@@ -111,9 +115,3 @@ def _means(problem: Problem, reward: Reward) -> FloatArray:
             np.quantile(lines.min_distance_m, 1 - LEVEL),
         ]
     )
-
-
-def _of_people(problem: Problem, reward: Reward, states: IntArray) -> float:
-    """The part of a path's reward that people cause, nats."""
-    by_term = rewards_by_term(problem, reward, states)
-    return sum(by_term[term.name] for term in reward.terms if term.about_people)

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Final, cast
 
 from navirl_cli.errors import ArtefactError
+from navirl_cli.files import open_regular
 
 #: Limits: bytes of a file, of the unpacked archive, and of a member's header; number of members. A published file takes
 #: a quarter of a megabyte.
@@ -105,7 +106,7 @@ def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePos
 
 def _opened(archive: Path, stack: ExitStack) -> IO[bytes]:
     """The archive's bytes, decompressed."""
-    file = stack.enter_context(archive.open("rb"))
+    file = stack.enter_context(open_regular(archive))
     head = file.read(max(map(len, _OTHERS)))
     packed = head.startswith(_GZIP)
     for magic, name in _OTHERS.items():

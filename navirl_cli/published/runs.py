@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from navirl_cli.errors import ArtefactError
+from navirl_cli.files import read_regular
 from navirl_cli.published.archive import MOST_OF_A_FILE, files_in
 
 MAP: Final = "nav_map.pkl"
@@ -97,7 +98,7 @@ def _run_of(folder: Path) -> Run | None:
     for path in paths:
         try:
             if path.is_file() and path.stat().st_size <= MOST_OF_A_FILE:
-                files[path.name] = path.read_bytes()
+                files[path.name] = read_regular(path)
             else:
                 lost.append(
                     f"{path}: expected a file of at most {MOST_OF_A_FILE >> 20} MB, found something else; left out"

@@ -27,7 +27,10 @@ def reach_line(content: Mapping[str, Any]) -> list[Block]:
     )
     both = found["min_distance_all_m"], found["min_distance_reachable_m"]
     if None not in both:
-        text += f". Mean least distance of the policy: {both[0]:.2f} m from all steps, {both[1]:.2f} m from these"
+        text += (
+            f". Mean least distance of the policy, from the robot's shell to a person's centre: {both[0]:.2f} m learnt "
+            f"from all steps, {both[1]:.2f} m from these"
+        )
     return [Paragraph(f"{text}.")]
 
 
@@ -58,6 +61,20 @@ def reach_warnings(content: Mapping[str, Any]) -> list[str]:
 def _seen(found: Mapping[str, Any]) -> str:
     """Where the reach comes from."""
     return "as stated" if found["seen_in"] is None else f"the farthest push, in {found['seen_in']}"
+
+
+def reach_unused(content: Mapping[str, Any], reach_m: float | None) -> list[str]:
+    """That a stated reach changed nothing.
+
+    Args:
+        content: Of the reward file.
+        reach_m: As stated; None where it was not.
+    """
+    if reach_m is None or content.get("reach") is not None or content["learnt_from"] == "reachable":
+        return []
+    return [
+        "`reach` has no effect: contact is unknown, nobody is in the scenes, or no step is in contact or within reach"
+    ]
 
 
 def evidence_remarks(chosen: Sequence[Demonstration], everyone: Sequence[Demonstration]) -> list[str]:

@@ -78,13 +78,20 @@ def rank_table(ranks: Sequence[Rank], learnt_from: Sequence[str] | None = None) 
 
 
 def rank_lines(ranked: Ranking) -> list[str]:
-    """The demonstrations that fit badly, and those that were not ranked."""
-    ranks, left_out = ranked.ranks, ranked.not_ranked
-    lines = [_bad(one) for one in ranks if one.fits_badly]
+    """The demonstrations that fit badly, those that were not ranked, and ranks that say nothing about the fit."""
+    ranks, left_out, unlike = ranked.ranks, ranked.not_ranked, ranked.unlike
+    lines = [_bad(one) for one in ranked.bad]
     if lines:
         # every demonstration has one lower end by log-likelihood, and two ends by distance and by area
-        chance = sum(RARE + 2 * EXTREME * (1 + (one.distance_rank is not None)) for one in ranks)
-        lines.append(f"of {len(ranks)} demonstrations at most {chance:.1f} would fit as badly by chance")
+        like = [one for one in ranks if one.group not in unlike]
+        chance = sum(RARE + 2 * EXTREME * (1 + (one.distance_rank is not None)) for one in like)
+        lines.append(f"of {len(like)} demonstrations at most {chance:.1f} would fit as badly by chance")
+    if unlike:
+        lines.append(f"the reward was not learnt from {' / '.join(unlike)}: ranks there do not show how well it fits")
+    if ranks and ranked.trained is None:
+        lines.append(
+            "it is unknown from which groups the reward was learnt: ranks of other groups do not show how well it fits"
+        )
     if left_out:
         names = ", ".join(f"{group} ({count})" for group, count in left_out.items())
         lines.append(f"not ranked, because the reward was not learnt from such trials: {names}")
@@ -97,7 +104,7 @@ def _bad(one: Rank) -> str:
     if one.distance_rank is not None:
         shares.append(f"{_percent(one.distance_rank)} pass people nearer")
     shares.append(f"{_percent(one.area_rank)} have a smaller area")
-    return f"{one.id} ({one.group}) fits this reward badly: {', '.join(shares)}"
+    return f"this reward fits {one.id} ({one.group}) badly: {', '.join(shares)}"
 
 
 def _percent(share: float) -> str:

@@ -1,7 +1,7 @@
 """The page of ``navirl report``."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,10 @@ from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
-from navirl_cli.evaluation.ranks import Rank, Ranking
+from navirl_cli.evaluation.ranks import Ranking
+from navirl_cli.planning.problem import problem_of
 from navirl_cli.reports.evaluation import group_table
-from navirl_cli.reports.evidence import reach_line
+from navirl_cli.reports.evidence import evidence_remarks, reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
@@ -35,6 +36,7 @@ from navirl_cli.reports.fit import (
 )
 from navirl_cli.reports.persons import person_blocks
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
+from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
 
 _CAPTIONS = {
@@ -44,6 +46,8 @@ _CAPTIONS = {
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
 #: The metrics of the paper and two more.
+#: A lower end this many times smaller than a positive quantity does not bound it.
+NOTHING = 1e-3
 METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 
 
@@ -72,7 +76,8 @@ def report_of(
     notes = repeated(demonstrations)
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
-        *_warnings(content, ranked.ranks),
+        *_recommendation(demonstrations, learnt, seed),
+        *_warnings(demonstrations, learnt, content, ranked),
         Heading("Parameters"),
         formula(learnt.reward.terms),
         parameter_table(content),
@@ -102,6 +107,12 @@ def report_of(
         Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
+
+
+def _recommendation(demonstrations: Sequence[Demonstration], learnt: LearntReward, seed: int) -> list[Block]:
+    """How to drive by the reward, on open ground and in the scene of the first demonstration that it is from."""
+    shown = next((one for one in demonstrations if one.id in learnt.demonstrations), demonstrations[0])
+    return recommendation_blocks(learnt, problem_of(shown), shown.id, seed)
 
 
 def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any]) -> str:
@@ -134,12 +145,16 @@ def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
     interval = ""
     if isfinite(one.lower) or isfinite(one.upper):
-        interval = f" ({_range(one.lower, one.upper)})"
+        interval = f" ({in_words(one.lower, one.upper, one.value)})"
     return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
-def _range(lower: float, upper: float) -> str:
-    """An interval in words; an open end is infinite."""
+def in_words(lower: float, upper: float, value: float) -> str:
+    """An interval in words; an open end is infinite, and one far below the value is none."""
+    if 0 <= lower < NOTHING * value:
+        lower = -inf
+    if not (isfinite(lower) or isfinite(upper)):
+        return "the demonstrations set no range"
     if not isfinite(lower):
         return f"less than {upper:.3g}"
     return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
@@ -154,10 +169,14 @@ def _rank_blocks(learnt: LearntReward, ranked: Ranking) -> list[Block]:
     return [*tables, *([Bullets(lines)] if lines else [])]
 
 
-def _warnings(content: Mapping[str, Any], ranks: Sequence[Rank]) -> list[Block]:
+def _warnings(
+    demonstrations: Sequence[Demonstration], learnt: LearntReward, content: Mapping[str, Any], ranked: Ranking
+) -> list[Block]:
     """What a reader should know before trusting the numbers."""
-    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in warnings(content)]
-    bad = ", ".join(one.id for one in ranks if one.fits_badly)
+    taught = [one for one in demonstrations if one.id in learnt.demonstrations]
+    said = [*evidence_remarks(taught, demonstrations), *warnings(content)]
+    lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in said]
+    bad = ", ".join(one.id for one in ranked.bad)
     if bad:
         lines.append(f"The policy rarely takes paths like those of {bad}; see the ranks.")
     return [Heading("Warnings"), Bullets(tuple(lines))] if lines else []

@@ -123,7 +123,8 @@ def learn(job: Job) -> Learnt:
 def _cycle_fit(shown: Sequence[Demonstration], start: Reward) -> CycleFit:
     """The fit of some demonstrations with its intervals."""
     evidence = evidence_of(shown)
-    found, analyses, _ = answers(evidence, fit(evidence, start), Questions())
+    # The study does not show the fit's bias, which is computed for whole paths only.
+    found, analyses, _ = answers(evidence, fit(evidence, start), Questions(), whole_paths=False)
     return CycleFit(found, None, analyses.intervals)
 
 

@@ -81,20 +81,21 @@ def study_of(
     """
     if not any(is_of_cycle(one, SECOND) for one in demonstrations):
         raise _refusal(demonstrations)
+    # Before other processes begin, so that these need not import again what it imports.
+    rows, known = tuple(rows_of(demonstrations)), _published_log_likelihood(demonstrations, published)
     learnt: list[Learnt] = []
     for one in map_in_order(learn, jobs_of(demonstrations, samples, seed, terms), executor):
         learnt.append(one)
         if progress is not None:
             progress(len(learnt), one.participant or "all")
     participants, pooled = tuple(learnt[:-1]), learnt[-1]
-    rows = tuple(rows_of(demonstrations))
     return Study(
         demonstrations=tuple(demonstrations),
         rows=rows,
         groups=tuple(groups_of(demonstrations, rows)),
         participants=participants,
         pooled=pooled,
-        published_log_likelihood=_published_log_likelihood(demonstrations, published),
+        published_log_likelihood=known,
         claims=tuple(claims_of(rows, participants)),
         completion_s=completion_s,
         terms=terms,

@@ -79,7 +79,7 @@ def ranks(
         )
     panels = by_group_and_training(found)
     page.draw(lambda axes: draw_rank_panels(axes, panels), **rank_layout(len(panels), page.width_in))
-    for line in rank_lines(Ranking(tuple(found), others)):
+    for line in rank_lines(Ranking(tuple(found), others, trained)):
         say(line)
 
 

@@ -15,6 +15,7 @@ from typing import BinaryIO, Final
 import zstandard
 
 from navirl_cli.errors import LogError
+from navirl_cli.files import open_regular
 from navirl_cli.limits import REMEDY, Allowance, in_mb
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.raw import RawFile
@@ -44,7 +45,7 @@ def open_log(path: Path) -> RawFile:
     check_path(path)
     with ExitStack() as on_failure:
         try:
-            file = on_failure.enter_context(path.open("rb"))
+            file = on_failure.enter_context(open_regular(path))
             size = os.fstat(file.fileno()).st_size
             head = file.read(_HEAD_BYTES)
             file.seek(0)

@@ -30,6 +30,9 @@ _CHUNK_HEAD: Final = 64
 #: Records that are skipped, if another record follows them.
 _SKIPPED: Final = frozenset({records.MESSAGE_INDEX, records.ATTACHMENT, records.METADATA})
 _LOG_TIME: Final = struct.Struct("<Q")
+#: Channel and bytes of entries of a message index, and bytes of an entry.
+_INDEX_HEAD: Final = struct.Struct("<HI")
+_INDEX_ENTRY_BYTES: Final = 16
 
 
 class _BrokenError(Exception):
@@ -175,6 +178,13 @@ class Survey:
         if code == records.CHUNK:
             return self._chunk(at, length, limit)
         self._check(code, stop, limit)
+        if self._holds_chunk(at, length, limit):
+            self._damage.add(
+                at, at + 1, f"a chunk starts with code {code:#04x} in place of {records.CHUNK:#04x}; it was read"
+            )
+            return self._chunk(at, length, limit)
+        if code == records.MESSAGE_INDEX and not self._is_index(at, length):
+            raise _BrokenError("the size of a message index is wrong")
         if code in _UNCHUNKED:
             return self._unchunked(at, stop, limit if code == records.MESSAGE else stop)
         if code == records.METADATA:
@@ -228,6 +238,8 @@ class Survey:
             head = self._raw.peek(at, min(limit, at + HEAD_SIZE + 2))
             if len(head) < HEAD_SIZE + 2 or head[0] != records.MESSAGE_INDEX:
                 return found, at
+            if not self._is_index(at, int(records.RECORD_HEAD.unpack_from(head)[1])):
+                break
             found[int.from_bytes(head[HEAD_SIZE:], "little")] = at
             at += HEAD_SIZE + int(records.RECORD_HEAD.unpack_from(head)[1])
         # the index that is cut or damaged may be that of any channel
@@ -247,6 +259,24 @@ class Survey:
             self.metadata.append(records.parse_metadata(self._raw.read(at + HEAD_SIZE, stop)))
         except records.MALFORMED as error:
             self._damage.add(at, stop, f"a metadata record does not parse: {error}")
+
+    def _holds_chunk(self, at: int, length: int, limit: int) -> bool:
+        """Whether a record that would be skipped has the contents of a chunk: a flipped bit of its code hides it."""
+        if self._raw.peek(at, at + 1)[0] in _UNCHUNKED:
+            return False
+        try:
+            head = self._chunk_head(at, limit)
+        except records.MALFORMED:
+            return False
+        return head.compression in COMPRESSIONS and length == head.data_start + head.data_size
+
+    def _is_index(self, at: int, length: int) -> bool:
+        """Whether the contents of a message index are as long as it says."""
+        head = self._raw.peek(at + HEAD_SIZE, at + HEAD_SIZE + _INDEX_HEAD.size)
+        if len(head) < _INDEX_HEAD.size:
+            return False
+        size = int(_INDEX_HEAD.unpack(head)[1])
+        return size % _INDEX_ENTRY_BYTES == 0 and length == _INDEX_HEAD.size + size
 
     def _check(self, code: int, stop: int, limit: int) -> None:
         """Refuse a record that ends at `stop` and can neither be used nor skipped."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from operator import itemgetter
 from pathlib import Path
@@ -12,30 +12,51 @@ from typing import Any, Final, Self
 import numpy as np
 from mcap.writer import CompressionType, Writer
 from numpy.typing import ArrayLike, NDArray
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from navirl_cli import __version__
 from navirl_cli.errors import LogError
 from navirl_cli.files import replacing
+from navirl_cli.logs.container.batches import Batch, Channel, gathered
 from navirl_cli.logs.messages.layout import derive
 from navirl_cli.logs.messages.schema import Schema, SchemaError
 
 _COMPRESSION: Final = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 _NS_PER_S: Final = 1_000_000_000
+#: What stands before a message's payload in its record.
+_MESSAGE_TIMES: Final = np.dtype([("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
+
+
+#: Foxglove's type for grids of numbers, as its ROS 2 package foxglove_msgs defines it: definitions by type.
+_FOXGLOVE: Final = {
+    "foxglove_msgs/msg/Vector2": "float64 x\nfloat64 y\n",
+    "foxglove_msgs/msg/PackedElementField": (
+        "string name\nuint32 offset\nuint8 UNKNOWN=0\nuint8 UINT8=1\nuint8 INT8=2\nuint8 UINT16=3\nuint8 INT16=4\n"
+        "uint8 UINT32=5\nuint8 INT32=6\nuint8 FLOAT32=7\nuint8 FLOAT64=8\nuint8 type\n"
+    ),
+    "foxglove_msgs/msg/Grid": (
+        "builtin_interfaces/Time timestamp\nstring frame_id\ngeometry_msgs/Pose pose\nuint32 column_count\n"
+        "foxglove_msgs/Vector2 cell_size\nuint32 row_stride\nuint32 cell_stride\n"
+        "foxglove_msgs/PackedElementField[] fields\nuint8[] data\n"
+    ),
+}
 
 
 @cache
 def _builtin() -> Typestore:
     """The standard message types, loaded once because that takes a tenth of a second."""
-    return get_typestore(Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, definition in _FOXGLOVE.items():
+        store.register(get_types_from_msg(definition, name))
+    return store
 
 
 def message_type(name: str) -> Any:
     """The class of a standard message type.
 
     Args:
-        name: "geometry_msgs/msg/WrenchStamped".
+        name: "geometry_msgs/msg/WrenchStamped", or Foxglove's "foxglove_msgs/msg/Grid".
 
     Returns:
         A dataclass whose fields are those of the message; numeric arrays must be numpy arrays of the exact type.
@@ -107,6 +128,7 @@ class LogWriter:
         self._channels: dict[str, _Channel] = {}
         self._sequences: dict[int, int] = {}
         self._held: list[tuple[int, int, bytes, int]] = []
+        self._copied: dict[Channel, int] = {}
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -126,6 +148,11 @@ class LogWriter:
         with self._stack:
             self.flush()
             self._writer.finish()  # type: ignore[no-untyped-call]
+
+    @property
+    def topics(self) -> list[str]:
+        """The topics so far, without those of copied messages."""
+        return list(self._channels)
 
     def flush(self) -> None:
         """Write the messages so far in the order of log time; later messages must have later times."""
@@ -173,6 +200,25 @@ class LogWriter:
         data = rows.tobytes()
         for number, t_ns in enumerate(times.tolist()):
             self._add(channel, data[number * size : (number + 1) * size], t_ns, t_ns)
+
+    def copy(self, batch: Batch, metadata: Mapping[str, str] | None = None) -> None:
+        """Write messages of another log at once, with their bytes, times and numbers, on a channel of their own.
+
+        Args:
+            batch: The messages.
+            metadata: Of their channel.
+        """
+        one = replace(batch.channel, id=0)  # the files of a bag number their channels by themselves
+        if one not in self._copied:
+            known = one.schema_name or one.schema_text
+            text = one.schema_text.encode()
+            schema = self._writer.register_schema(one.schema_name, one.schema_encoding, text) if known else 0
+            channel = self._writer.register_channel(one.topic, one.message_encoding, schema, dict(metadata or {}))
+            self._copied[one] = channel
+        heads = gathered(batch.raw, batch.starts - _MESSAGE_TIMES.itemsize, _MESSAGE_TIMES)
+        for number, (sequence, log_time_ns, publish_time_ns) in enumerate(heads.tolist()):
+            payload = batch.payload(number)
+            self._writer.add_message(self._copied[one], log_time_ns, payload, publish_time_ns, sequence)
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record with a name and texts by key."""
