@@ -13,9 +13,9 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.newcomer import Others, newcomer
 from navirl_cli.irl.population import population
-from navirl_cli.irl.random_effects import Spread
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.status import Status
 
 TRUTH = np.array([-40.0, -2.0, -5.0, 2.0])
@@ -81,10 +81,11 @@ def test_a_newcomer_without_scatter_is_the_typical_person(found):
     evidence, _, typical, known, _ = found
     _, own = evidence.apart("p3")
     none = Others(known.scale, Spread(known.mean, np.full(4, 1e-4)))
-    alike, _ = newcomer(own, none, "new")
-    assert np.allclose(alike.reward.theta, typical.reward.theta, rtol=1e-3)
     wide = Others(known.scale, Spread(known.mean, np.sqrt(np.diag(known.prediction()))))
-    fitted, ends = newcomer(own, wide, "new")
+    plain = [fit(own, typical.reward, prior=one.prior()) for one in (none, wide)]
+    alike, _ = newcomer(own, plain[0], none, "new")
+    assert np.allclose(alike.reward.theta, typical.reward.theta, rtol=1e-3)
+    fitted, ends = newcomer(own, plain[1], wide, "new")
     assert fitted.log_likelihood > alike.log_likelihood
     assert all(one.lower < value < one.upper for one, value in zip(ends.ends, fitted.reward.theta, strict=True))
 

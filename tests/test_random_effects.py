@@ -8,17 +8,10 @@ import pytest
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.newton import Point
-from navirl_cli.irl.random_effects import (
-    LEAST,
-    WIDTH,
-    Factors,
-    Restricted,
-    Spread,
-    draw,
-    laplace,
-    random_effects,
-    scattered,
-)
+from navirl_cli.irl.nodes import draw, laplace, scattered
+from navirl_cli.irl.random_effects import random_effects
+from navirl_cli.irl.restricted import LEAST, WIDTH, Restricted
+from navirl_cli.irl.spread import Factors, Spread
 
 
 class Here:

@@ -12,8 +12,8 @@ from navirl_cli.irl.intervals import LEVEL, Errors, Kind
 from navirl_cli.irl.log_scale import LogScale
 from navirl_cli.irl.newcomer import Others
 from navirl_cli.irl.population import Person, Population
-from navirl_cli.irl.random_effects import Spread
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.uncertainty import condition_number
 
 

@@ -9,9 +9,10 @@ from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.log_scale import LogScale, Witness
+from navirl_cli.irl.nodes import draw, laplace
 from navirl_cli.irl.population import person_of
 from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.random_effects import Spread, draw, laplace
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.status import Status
 
 #: Times that the nodes are drawn again around the posterior that the last ones found.
