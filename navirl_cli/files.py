@@ -15,6 +15,8 @@ from typing import BinaryIO, Final
 
 from navirl_cli.errors import ArtefactError
 
+#: The file that lists a folder of demonstrations files.
+MANIFEST = "manifest.json"
 #: Numbers of this process's temporary files.
 _NUMBERS = count()
 #: What a path can be besides a regular file.
@@ -72,19 +74,21 @@ class Input:
 
     @staticmethod
     def of(path: Path) -> "Input":
-        """Name and hash of a file.
+        """Name and hash of a file; of a folder those of its manifest, which names and hashes the others.
 
         Raises:
             ArtefactError: It cannot be read.
         """
-        digest = sha256()
+        digest, name = sha256(), path.name
+        if path.is_dir() and (path / MANIFEST).exists():
+            path, name = path / MANIFEST, f"{path.resolve().name}/{MANIFEST}"
         try:
             with open_regular(path) as stream:
                 while block := stream.read(1 << 20):
                     digest.update(block)
         except OSError as error:
             raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
-        return Input(path.name, digest.hexdigest())
+        return Input(name, digest.hexdigest())
 
 
 @contextmanager

@@ -1,26 +1,136 @@
-"""Parallel work over many logs or fits, through one function that takes any executor."""
+"""The same work over many items, through any concurrent.futures Executor.
+
+Local processes end with their parent, take the function once, and are replaced when one of them is killed: an item that
+kills its process a second time, alone, is lost, and the others are not. Results do not depend on the executor or on the
+order in which items are done.
+"""
 
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from queue import SimpleQueue
 from threading import Thread
 from types import FrameType
-from typing import TypeVar
+from typing import Any, Final, ParamSpec, Protocol, TypeVar, runtime_checkable
+
+from navirl_cli.errors import WorkerLostError
 
 #: A worker whose parent is gone has this long to clean up, s.
-_GRACE_S = 2.0
+_GRACE_S: Final = 2.0
+#: Items that are handed to an executor of unknown size before the first of them is done.
+_AHEAD: Final = 1000
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+P = ParamSpec("P")
+#: Starts the work on an item.
+Submit = Callable[[Item], Future[Result]]
+
+#: Cores for the present work, where several works share a machine.
+_share: ContextVar[int | None] = ContextVar("share", default=None)
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Number of cores that the present work may use."""
+    own = _share.get()
+    if own is not None:
+        return own
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def sharing(function: Callable[P, Result], count: int, /, *args: P.args, **kwargs: P.kwargs) -> Result:
+    """Call a function that may use so many cores."""
+    token = _share.set(count)
+    try:
+        return function(*args, **kwargs)
+    finally:
+        _share.reset(token)
+
+
+@runtime_checkable
+class Holding(Protocol):
+    """An executor that keeps the function with its workers, so that only items and results travel."""
+
+    def holding(
+        self, function: Callable[[Item], Result], count: int
+    ) -> AbstractContextManager[tuple[Submit[Item, Result], int]]:
+        """Give the function to the workers.
+
+        Args:
+            function: The work.
+            count: Number of items to come.
+
+        Returns:
+            A context manager of the function that starts the work on an item, and the number of items that it should
+            be given before the first of them is done.
+        """
+        ...
+
+
+class Local(Executor):
+    """Processes of this machine; they start with each work and end with it.
+
+    Args:
+        workers: Number of processes; None for one for each core.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or cores()
+
+    def submit(self, fn: Callable[P, Result], /, *args: P.args, **kwargs: P.kwargs) -> "Future[Result]":
+        """Work on one item in this process: to start another one for it takes longer."""
+        future: Future[Result] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - whoever asks for the result gets it
+            future.set_exception(error)
+        return future
+
+    @contextmanager
+    def holding(self, function: Callable[[Item], Result], count: int) -> Iterator[tuple[Submit[Item, Result], int]]:
+        """As in :class:`Holding`; a single item or worker stays in this process."""
+        workers = min(count, self.workers)
+        if workers < 2:
+            yield lambda item: self.submit(function, item), 1
+            return
+        with self.processes(function, workers) as submit:
+            yield submit, 2 * workers
+
+    @contextmanager
+    def processes(self, function: Callable[[Item], Result], workers: int) -> Iterator[Submit[Item, Result]]:
+        """Start processes, and end them when the block ends."""
+        from concurrent.futures import ProcessPoolExecutor  # which imports multiprocessing
+
+        share = max(1, cores() // workers)
+        with ProcessPoolExecutor(workers, initializer=_Worker.listen, initargs=(function, share)) as pool:
+
+            def submit(item: Item) -> "Future[Result]":
+                with _no_interrupt():  # Python loses an interrupt that comes while a process forks
+                    return pool.submit(_Worker.run, item)
+
+            try:
+                yield submit
+            except BaseException:
+                _Worker.interrupt_all()
+                raise
+
+    def alone(self, function: Callable[[Item], Result], item: Item) -> "Future[Result]":
+        """The future of an item that gets a process of its own, done; the process may end."""
+        with self.processes(function, 1) as submit:
+            future = submit(item)
+            if isinstance(future.exception(), BrokenExecutor):
+                future = Future()
+                future.set_exception(
+                    WorkerLostError(
+                        "expected a result, found that the process ended twice, also when it worked on "
+                        "this alone: it was killed, mostly because memory ran out, or it crashed"
+                    )
+                )
+        return future
 
 
 def map_in_order(
@@ -35,23 +145,94 @@ def map_in_order(
 
     Yields:
         Results in the order of the items.
-    """
-    workers = min(len(items), cores())
-    if executor is not None:
-        yield from executor.map(function, items)
-    elif workers < 2:
-        yield from map(function, items)
-    else:
-        from concurrent.futures import ProcessPoolExecutor  # which imports multiprocessing
 
-        with ProcessPoolExecutor(workers, initializer=_Worker.listen) as pool:
-            try:
-                with _no_interrupt():  # Python loses an interrupt that comes while a process forks
-                    results = pool.map(partial(_Worker.run, function), items)
-                yield from results
-            except BaseException:
-                _Worker.interrupt_all()
-                raise
+    Raises:
+        WorkerLostError: The process of an item ended twice.
+    """
+    early: dict[int, Future[Result]] = {}
+    following = 0
+    for number, done in as_completed(function, items, executor):
+        early[number] = done
+        while following in early:
+            yield early.pop(following).result()
+            following += 1
+
+
+def as_completed(
+    function: Callable[[Item], Result], items: Sequence[Item], executor: Executor | None = None
+) -> "Iterator[tuple[int, Future[Result]]]":
+    """Apply a function to every item, and yield each as soon as it is done.
+
+    Args:
+        function: As in :func:`map_in_order`.
+        items: The arguments. A limited number of them is handed on before the first is done.
+        executor: As in :func:`map_in_order`.
+
+    Yields:
+        Number of the item, and its future, which is done: with the result, what the function raised, or
+        :class:`~navirl_cli.errors.WorkerLostError`.
+    """
+    engine = Local() if executor is None else executor
+    left = dict(enumerate(items))
+    while left:
+        struck = []
+        with _held(engine, function, len(left)) as (submit, ahead):
+            for number, done in _completed(submit, list(left.items()), ahead):
+                if isinstance(engine, Local) and isinstance(done.exception(), BrokenExecutor):
+                    struck.append(number)
+                    continue
+                del left[number]
+                yield number, done
+        # One of these ended its process, and with it all that had begun: each is tried again, alone.
+        for number in struck:
+            yield number, Local().alone(function, left.pop(number))
+
+
+@contextmanager
+def _held(
+    engine: Executor, function: Callable[[Item], Result], count: int
+) -> Iterator[tuple[Submit[Item, Result], int]]:
+    """As :meth:`Holding.holding`, for any executor."""
+    if isinstance(engine, Holding):
+        with engine.holding(function, count) as held:
+            yield held
+    else:
+        yield lambda item: engine.submit(function, item), _AHEAD
+
+
+def _completed(
+    submit: Submit[Item, Result], jobs: Iterable[tuple[int, Item]], ahead: int
+) -> "Iterator[tuple[int, Future[Result]]]":
+    """Yield jobs when they are done, with so many begun; none is begun after a process has ended."""
+    todo = iter(jobs)
+    running: dict[int, Future[Result]] = {}
+    done: SimpleQueue[int] = SimpleQueue()
+    try:
+        while True:
+            while len(running) < ahead and (job := next(todo, None)) is not None:
+                number = job[0]
+                running[number] = future = _begun(submit, job[1])
+                future.add_done_callback(lambda _, number=number: done.put(number))  # type: ignore[misc]
+            if not running:
+                return
+            number = done.get()
+            future = running.pop(number)
+            if isinstance(future.exception(), BrokenExecutor):
+                todo = iter(())
+            yield number, future
+    finally:
+        for future in running.values():
+            future.cancel()
+
+
+def _begun(submit: Submit[Item, Result], item: Item) -> "Future[Result]":
+    """The future of an item, also where no process is left to take it."""
+    try:
+        return submit(item)
+    except BrokenExecutor as error:
+        future: Future[Result] = Future()
+        future.set_exception(error)
+        return future
 
 
 @contextmanager
@@ -75,10 +256,14 @@ class _Worker:
 
     busy = False
     stopped = False
+    #: The work, as the process got it when it began.
+    function: Callable[[Any], Any]
 
     @classmethod
-    def listen(cls) -> None:
-        """Handle interrupts and the end of the parent from now on, in a new process."""
+    def listen(cls, function: Callable[[Any], Any], share: int) -> None:
+        """Handle interrupts and the end of the parent from now on, in a new process with its share of cores."""
+        cls.function = staticmethod(function)
+        _share.set(share)
         Thread(target=cls._follow_parent, daemon=True).start()
         signal.signal(signal.SIGINT, cls._interrupted)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -86,13 +271,13 @@ class _Worker:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
     @classmethod
-    def run(cls, function: Callable[[Item], Result], item: Item) -> Result:
+    def run(cls, item: Any) -> Any:
         """Process an item, unless there was an interrupt."""
         if cls.stopped:
             raise KeyboardInterrupt
         cls.busy = True
         try:
-            return function(item)
+            return cls.function(item)
         finally:
             cls.busy = False
 

@@ -120,7 +120,11 @@ def test_keywords_are_the_options_with_their_defaults(function, path):
     }
     options = options_of(*path)
     beyond = {"executor", "axes", "page", "demos", "demonstration", "reward", "name"}
-    of_the_shell = {"wide", "style", "trial", "group", "reward"}
+    # `name` of plot.profile is one --parameter
+    of_the_shell = {"parameter", "wide", "style", "font", "group", "reward"}
+    of_the_shell |= {"trial"} if "trial" not in keywords else set()
+    if "demonstration" in keywords:  # which demonstrations.select chooses
+        of_the_shell |= {"condition", "cycle", "set", "participant", "all"}
     # the table of trials is a file to fill in
     table = {"trials", "split", "goal", "frame"} if path == ("inspect",) else set()
     missing = set(options) - set(keywords) - of_the_shell - table
@@ -192,7 +196,7 @@ class TestFrames:
         pytest.importorskip("pandas")
         assert len(demos.to_frame()) == len(demos)
         assert list(reward.to_frame()["name"]) == ["c0", "a_g", "a_p", "sigma_p"]
-        found = navirl.evaluate(demos, reward, pair=("force, cycle 2", "joystick"), ranks=True, samples=20)
+        found = navirl.evaluate(demos, reward, all=True, pair=("force, cycle 2", "joystick"), ranks=True, samples=20)
         groups = found.to_frame()
         assert groups.loc[groups["path_type"] == "driven", "length_m_mean"].notna().all()
         assert len(found.to_frame("demonstrations")) == len(demos)
@@ -271,7 +275,7 @@ class TestErrors:
             (lambda _d, r: r["c1"], "parameter: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'"),
             (
                 lambda d, r: navirl.plot.policy(r, d[0], overlay="paths"),
-                "`overlay`: expected one of 'demos', 'samples'",
+                "`overlay`: expected one of 'demos', 'all', 'samples'",
             ),
             (
                 lambda d, r: navirl.plot.policy(r, d[0], style="grey"),

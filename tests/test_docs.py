@@ -24,6 +24,7 @@ SLOW = {
     "index.md",
     "nav2-study.md",
     "other-rewards.md",
+    "persons.md",
     "published-study.md",
     "several-rewards.md",
 }

@@ -112,7 +112,16 @@ def test_without_a_pair_no_statistics_are_imported(work):
         "import sys; from navirl_cli.cli import cli; cli(sys.argv[1:], standalone_mode=False); "
         "sys.exit(', '.join(name for name in ('scipy.stats', 'scipy.signal') if name in sys.modules) or None)"
     )
-    words = [sys.executable, "-c", program, "evaluate", str(work / "demos.json"), "--reward", str(work / "learnt.json")]
+    words = [
+        sys.executable,
+        "-c",
+        program,
+        "evaluate",
+        str(work / "demos.json"),
+        "--reward",
+        str(work / "learnt.json"),
+        "--all",
+    ]
     found = subprocess.run([*words, "--metrics", "all", "--samples", "2"], capture_output=True, text=True, check=False)
     assert (found.returncode, found.stderr) == (0, "")
 
@@ -151,7 +160,7 @@ def test_groups_by_participant(navirl, work):
 
 
 def test_ranks_are_printed_with_their_test(navirl, work):
-    words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--ranks", "--samples", "200")
+    words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--ranks", "--samples", "200", "--all")
     document = json.loads(navirl(*words, "-o", "m.json", "--json").stdout)
     ranks = document["ranks"]
     assert read_json(Path("m.json"), "metrics")["ranks"] == ranks

@@ -27,6 +27,8 @@ SLOW = {
     "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",
+    "watch logs --reward reward.json --participant p04 --condition force -o visit",
+    "watch logs --condition force -o visit --once",
     "study p01.mcap p02.mcap p03.mcap -o study",
 }
 EVERY = [pytest.param(words, command, id=" ".join(words)) for words, command in commands()]
@@ -60,6 +62,8 @@ def folder(tmp_path_factory):
             [*fit, "--profile", "sigma_p", "-o", "reward.json"],
             [*fit, "-o", "first.json"],
             [*fit, "--only-corrected", "-o", "second.json"],
+            ["select", "demos.json", "--participant", "p01", "-o", "monday.json"],
+            ["select", "demos.json", "--participant", "p02", "-o", "tuesday.json"],
         ):
             result = CliRunner().invoke(cli, words)
             assert result.exit_code == 0, result.output
@@ -176,6 +180,8 @@ def test_examples_run(folder, tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "rerun", fake_rerun())
     words = shlex.split(line)[1:]
+    if words[0] == "watch" and "--once" not in words:
+        words.append("--once")  # it would wait for more
     output = words[words.index("-o") + 1] if "-o" in words else None
     for path in folder.iterdir():
         if path.name != output:

@@ -13,9 +13,8 @@ from navirl_cli.logs.overview import overview
 from navirl_cli.logs.sources import Source
 
 SHARED = Path(__file__).resolve().parent.parent.parent / "shared"
-#: Logs of the folders beside the project; some of the attacks take minutes to read.
-SLOW = {"tinymsgs256.mcap", "chunks256x8.mcap", "cutbomb_zstd.mcap"}
-LOGS = [path for path in sorted(SHARED.glob("[ac]*/*.mcap")) if path.name not in SLOW]
+#: Logs of the folders beside the project.
+LOGS = sorted(SHARED.glob("[ac]*/*.mcap"))
 
 
 def check_agreement(path: Path) -> None:

@@ -13,7 +13,7 @@ from navirl_cli.irl.terms import TERMS
 
 #: Artefacts of version 1 and those that came later.
 FIRST = ("demonstrations", "reward", "metrics", "study")
-KINDS = (*FIRST, "plan")
+KINDS = (*FIRST, "plan", "manifest")
 ROOT = Path(__file__).parent.parent
 UNITS = ("s", "hz", "m", "m2", "m_s", "m_s2", "m_s3", "1_m", "rad", "n", "n_s", "m_s_n", "j", "share", "bytes")
 #: Counts, numbers of order, statistics without a unit.
@@ -48,7 +48,20 @@ WITHOUT = {
         "stopped_early",
     ),
     *("identified_draws", "counts", "median", "cells_equal", "theta_participants"),
-    *("precision", "rank", "rank_biserial", "cohen_dz", "wilcoxon_p", "p_value", "statistic", "level", "l2"),
+    *(
+        "precision",
+        "rank",
+        "distance_rank",
+        "area_rank",
+        "not_ranked",
+        "rank_biserial",
+        "cohen_dz",
+        "wilcoxon_p",
+        "p_value",
+        "statistic",
+        "level",
+        "l2",
+    ),
     *("condition_number", "mismatch_standard_errors", "parameter_count"),
     # how people are scattered: of logarithms
     *("log_mean", "log_covariance", "scatter", "scatter_lower", "scatter_upper", "scatter_rms"),

@@ -13,7 +13,7 @@ ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
         ["files", "parallel"],
-        ["documents"],
+        ["documents", "cluster"],
         ["logs"],
         ["demos"],
         ["irl"],
@@ -22,7 +22,7 @@ ORDERS = {
         ["artefacts", "export"],
         ["reports"],
         ["figures"],
-        ["api"],
+        ["api", "watching"],
         ["commands"],
         ["cli"],
         ["__main__"],

@@ -14,6 +14,7 @@ import study_data
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.demos.subset import Subset
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import PAPER_L2, fit
@@ -192,7 +193,7 @@ def study(tmp_path_factory):
         for one in extract(load_recording(path, LoadOptions(forces=Forces.IGNORED)), ExtractSettings()).demonstrations
         if one.set is None
     ]
-    force, joystick = select(found, conditions=("force",), cycle=2), select(found, conditions=("joystick",))
+    force, joystick = select(found, Subset(("force",), (2,))), select(found, Subset(("joystick",)))
     return {"force": force.evidence, "joystick": joystick.evidence}
 
 

@@ -82,10 +82,9 @@ def test_a_newcomer_without_scatter_is_the_typical_person(found):
     _, own = evidence.apart("p3")
     none = Others(known.scale, Spread(known.mean, np.full(4, 1e-4)))
     wide = Others(known.scale, Spread(known.mean, np.sqrt(np.diag(known.prediction()))))
-    plain = [fit(own, typical.reward, prior=one.prior()) for one in (none, wide)]
-    alike, _ = newcomer(own, plain[0], none, "new")
+    alike, _ = newcomer(own, none, "new", fit(own, typical.reward, prior=none.prior()))
     assert np.allclose(alike.reward.theta, typical.reward.theta, rtol=1e-3)
-    fitted, ends = newcomer(own, plain[1], wide, "new")
+    fitted, ends = newcomer(own, wide, "new")
     assert fitted.log_likelihood > alike.log_likelihood
     assert all(one.lower < value < one.upper for one, value in zip(ends.ends, fitted.reward.theta, strict=True))
 

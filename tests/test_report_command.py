@@ -24,7 +24,16 @@ def work(tmp_path_factory):
     for words in (
         ["extract", *LOGS, "-o", folder / "demos.json"],
         ["fit", folder / "demos.json", "--cycle", 2, "--profile", "c0", "-o", folder / "reward.json"],
-        ["report", folder / "demos.json", folder / "reward.json", "-o", folder / "page.html", "--samples", 100],
+        [
+            "report",
+            folder / "demos.json",
+            folder / "reward.json",
+            "-o",
+            folder / "page.html",
+            "--samples",
+            100,
+            "--all",
+        ],
     ):
         result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
         assert result.exit_code == 0, result.output

@@ -22,7 +22,7 @@ from navirl_cli.reports.models import terms_table
 
 HERE = Path(__file__).parent.parent
 GENERATED = HERE / "_generated"
-KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
+KINDS = ("demonstrations", "manifest", "reward", "metrics", "plan", "study")
 
 
 class Markdown(click.HelpFormatter):

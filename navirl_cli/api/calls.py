@@ -9,7 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
+from navirl_cli.api.arguments import (
+    Point,
+    chosen,
+    one_of,
+    pairs_in,
+    points_in,
+    subset_in,
+    terms_in,
+    texts,
+    topics_in,
+    within,
+)
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
@@ -31,20 +42,23 @@ from navirl_cli.artefacts.demonstrations import (
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.persons import whose
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
+from navirl_cli.cluster import workers_of
 from navirl_cli.demos.contact import PushSettings
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
+from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.evaluation.groups import FIELDS, groups_named
+from navirl_cli.evaluation.groups import groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, chosen_to_rank, ranking
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Pool, Questions, answers
@@ -97,6 +111,8 @@ def extract(
     time: str = "header",
     join: bool = False,
     strict: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
     executor: Executor | None = None,
 ) -> Demonstrations:
     """Turn MCAP logs into demonstrations, as ``navirl extract``.
@@ -132,8 +148,10 @@ def extract(
         time: Time of a message: the stamp in its "header", or the time of receipt in the "log".
         join: Treat all logs as parts of one recording.
         strict: Refuse damaged logs.
-        executor: Processes several logs in parallel; threads of this process by default. An executor of processes is
-            faster. Create it under ``if __name__ == "__main__":``.
+        workers: Number of processes that read several logs, in place of threads of this process; faster. Use it under
+            ``if __name__ == "__main__":``.
+        cluster: Address of a running Dask scheduler that distributes the logs.
+        executor: Any other executor that does so.
 
     Returns:
         The trials.
@@ -182,8 +200,8 @@ def extract(
     )
     table = None if trials is None else Path(trials)
     labels = None if table is None else read_labels(table)
-    with _workers(executor) as workers:
-        found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=workers)
+    with _executor(executor, workers, cluster) as where:
+        found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=where)
     said = settings_document(settings, options, map_file, table)
     return _extracted(found, said, [one for one in (map_file, table) if one is not None])
 
@@ -248,7 +266,10 @@ def fit(
     l2: float = PAPER_L2,
     method: str = "newton",
     condition: str | Collection[str] = (),
-    cycle: int | None = None,
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
     only_corrected: bool = False,
     truncated: bool = False,
     steps: str = "all",
@@ -259,6 +280,8 @@ def fit(
     profile: str | Sequence[str] = (),
     cross_validate: str | None = None,
     seed: int = 0,
+    workers: int | None = None,
+    cluster: str | None = None,
     executor: Executor | None = None,
 ) -> FittedReward:
     """Learn a navigation reward from demonstrations, as ``navirl fit``.
@@ -280,8 +303,11 @@ def fit(
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
             of 10 /m, without the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
-        condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
-        cycle: Use trials of this cycle only.
+        condition: Only trials of these conditions: "force", "joystick", "autonomous"; one or several.
+        cycle: Only trials of these cycles; one or several.
+        set: Only trials of these sets; "main task" are those of none.
+        participant: Only trials of these participants.
+        trial: Only these trials, by their ids.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, those during "contact", or those in contact or within the person's reach
@@ -295,8 +321,10 @@ def fit(
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
         seed: Seed of the bootstrap.
-        executor: Computes bootstrap and cross-validation in parallel; threads of this process by default. An executor
-            of processes is faster. Create it under ``if __name__ == "__main__":``.
+        workers: Number of processes for bootstrap and cross-validation, in place of threads of this process; faster.
+            Use it under ``if __name__ == "__main__":``.
+        cluster: Address of a running Dask scheduler that distributes them.
+        executor: Any other executor that does so.
 
     Returns:
         The reward with its covariance and its status.
@@ -323,12 +351,11 @@ def fit(
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
-    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    subset = subset_in(condition, cycle, set, participant, trial)
     reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
         of_participant(demos, person),
-        conditions=conditions,
-        cycle=cycle,
+        subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=which,
@@ -348,11 +375,11 @@ def fit(
         method=chosen(Method, method, "method"),
     )
     effect = reach_effect(selected.demonstrations, found, which, reach_m)
-    with _workers(executor) as workers:
+    with _executor(executor, workers, cluster) as where:
         whole = which is Steps.ALL
         others = None if earlier is None else earlier.others
         found, analyses, lost = answers(
-            selected.evidence, found, questions, others=others, whole_paths=whole, executor=workers
+            selected.evidence, found, questions, others=others, whole_paths=whole, executor=where
         )
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
@@ -362,7 +389,7 @@ def fit(
         document |= whose(person, earlier.participants)
     notes = (
         *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
+        *remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos),
         *reach_unused(document, reach_m),
         *fit_warnings(document),
     )
@@ -380,6 +407,12 @@ def evaluate(
     *,
     person: str | None = None,
     metrics: str | Sequence[str] = (),
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     by: str | Collection[str] = (),
     pair: tuple[str, str] | Sequence[tuple[str, str]] = (),
     ranks: bool = False,
@@ -394,6 +427,13 @@ def evaluate(
         reward: A reward, its file, values by name of parameter; or several rewards by name.
         person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         metrics: Names of metrics, or "all"; the paper's three by default.
+        condition: Only trials of these conditions, as of :func:`fit`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials. By default those that the rewards were learnt from, where that is known, and those to compare
+            with.
         by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
         ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
@@ -412,8 +452,8 @@ def evaluate(
     Example:
         >>> navirl.evaluate(demos, reward).to_frame()[["group", "path_type", "length_m_mean"]]
     """
-    demos = demonstrations_in(demos)
-    rewards = _rewards(reward, demos, person)
+    everyone = demonstrations_in(demos)
+    rewards = _rewards(reward, everyone, person)
     if ranks and len(rewards) != 1:
         raise ArgumentError("`ranks` needs one `reward`")
     measured = _metrics(metrics)
@@ -423,9 +463,13 @@ def evaluate(
         None if precision is None else within("precision", precision, 1e-3, 1),
     )
     asked = pairs_in(pair)
-    groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
-    one = next(iter(rewards.values()), None)
-    trained = one.trained(demos) if ranks and isinstance(one, LearntReward) else None
+    subset = subset_in(condition, cycle, set, participant, trial)
+    known = [one.trained(everyone) if isinstance(one, LearntReward) else None for one in rewards.values()]
+    trained = known[0] if ranks else None
+    named = groups_named(subset.of(everyone), [name for one in asked for name in one], fields, "pair")
+    also = [one for own in (*named, *([chosen_to_rank(everyone, trained)[0]] if ranks else [])) for one in own]
+    taken = choose(everyone, subset, known, everything=all, also=also)
+    demos = taken.demonstrations
     if ranks:
         check_to_rank(demos, trained)
     rng = np.random.default_rng(seed)
@@ -435,10 +479,10 @@ def evaluate(
     ranked = Ranking()
     if ranks:
         ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
-    inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
+    inputs = [*sources_behind(everyone), *(file for one in rewards.values() for file in files_behind(one))]
     document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
     _warn(result.notes)
-    return Evaluation(result, measured, compared, ranked, document)
+    return Evaluation(result, measured, compared, ranked, document, (taken.note,) if taken.note else ())
 
 
 def policy(reward: PathLike | AnyReward, demonstration: Demonstration, *, person: str | None = None) -> ScenePolicy:
@@ -473,13 +517,19 @@ def _warn(lines: Sequence[str], depth: int = 3) -> None:
 
 
 @contextmanager
-def _workers(executor: Executor | None) -> Iterator[Executor]:
-    """The executor: by default threads. Processes that cannot fork would run the user's script again."""
+def _executor(executor: Executor | None, workers: int | None, cluster: str | None) -> Iterator[Executor]:
+    """Where to work: by default in threads. Processes that cannot fork would run the user's script again."""
+    if sum(one is not None for one in (executor, workers, cluster)) > 1:
+        raise ArgumentError("`workers`, `cluster` and `executor` exclude each other: name one of them")
     if executor is not None:
         yield executor
-        return
-    with ThreadPoolExecutor(cores()) as own:
-        yield own
+    elif workers is not None or cluster is not None:
+        count = None if workers is None else int(within("workers", workers, 1, 4096))
+        with workers_of(count, cluster) as own:
+            yield own
+    else:
+        with ThreadPoolExecutor(cores()) as own:
+            yield own
 
 
 def _rewards(

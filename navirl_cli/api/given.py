@@ -6,11 +6,13 @@ from typing import TypeAlias, TypeVar
 
 from navirl_cli.api.results import Demonstrations, FittedReward
 from navirl_cli.artefacts.demonstrations import demonstrations_of
+from navirl_cli.artefacts.demonstrations import read_demonstrations as read_all
+from navirl_cli.artefacts.manifest import inputs_of, manifest_path, read_manifest
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, DemonstrationError
-from navirl_cli.files import Input
+from navirl_cli.files import MANIFEST, Input
 from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.fit import warnings
 
@@ -21,7 +23,7 @@ Given = TypeVar("Given")
 
 
 def read_demonstrations(path: PathLike) -> Demonstrations:
-    """Read a demonstrations file.
+    """Read a demonstrations file, or a folder of them with a manifest.
 
     Args:
         path: As written by ``navirl extract`` or :meth:`Demonstrations.write`.
@@ -33,13 +35,17 @@ def read_demonstrations(path: PathLike) -> Demonstrations:
         NavirlError: The file is missing, is not a demonstrations file, or holds no demonstrations.
     """
     path = Path(path)
-    document = read_json(path, "demonstrations")
-    trials = demonstrations_of(document, str(path))
+    if manifest_path(path).name == MANIFEST:
+        document = read_json(manifest_path(path), "manifest")
+        trials, inputs = read_all(path), inputs_of(read_manifest(path))
+    else:
+        document = read_json(path, "demonstrations")
+        trials, inputs = demonstrations_of(document, str(path)), [Input(**one) for one in document["inputs"]]
     if not trials:
         raise DemonstrationError(f"{path}: holds no demonstrations")
     return Demonstrations(
         trials,
-        inputs=[Input(**one) for one in document["inputs"]],
+        inputs=inputs,
         settings=document["settings"],
         notes=[f"{one.id}: {note}" for one in trials for note in one.notes],
         gain=document.get("gain"),

@@ -1,6 +1,6 @@
 """Results of the public functions: tables and arrays to print, write, and convert to pandas."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from navirl_cli.api.arguments import subset_in
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.persons import of_person
@@ -91,12 +92,40 @@ class Demonstrations(Sequence[Demonstration]):
         """A trial, or several."""
         if isinstance(index, int):
             return self._trials[index]
-        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
-        return Demonstrations(self._trials[index], notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
+        return self._with(self._trials[index])
 
     def __repr__(self) -> str:
         """The table of trials."""
         return to_text([trial_table(self)])
+
+    def select(
+        self,
+        *,
+        condition: str | Collection[str] = (),
+        cycle: int | Collection[int] = (),
+        set: str | Collection[str] = (),  # noqa: A002 the option's name
+        participant: str | Collection[str] = (),
+        trial: str | Collection[str] = (),
+    ) -> "Demonstrations":
+        """The trials of some conditions, cycles, sets, participants, or with some ids, as ``navirl select``.
+
+        Args:
+            condition: "force", "joystick", "autonomous"; one or several, as all arguments.
+            cycle: Numbers of cycles.
+            set: Names of sets; "main task" for trials of none.
+            participant: Names of participants.
+            trial: Ids.
+
+        Raises:
+            NavirlError: There are no such trials.
+        """
+        chosen = subset_in(condition, cycle, set, participant, trial).of(self._trials)
+        return self._with(chosen)
+
+    def _with(self, trials: Iterable[Demonstration]) -> "Demonstrations":
+        """Some of the trials, with the same sources."""
+        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
+        return Demonstrations(trials, notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
 
     def sources(self) -> tuple[Input, ...]:
         """The file that the trials were read from, or the logs that they were extracted from."""
@@ -303,6 +332,7 @@ class Evaluation:
         pairs: Groups compared by participant.
         ranks: Ranks of the demonstrations among paths of the policy, and how many were not ranked.
         document: The content of a metrics file.
+        notes: Which demonstrations were measured, where the reward decided it.
     """
 
     comparison: Comparison
@@ -310,10 +340,11 @@ class Evaluation:
     pairs: Sequence[tuple[str, str, Mapping[str, Paired]]]
     ranks: Ranking
     document: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """The tables, as ``navirl evaluate`` prints them."""
-        return self._written(Format.TEXT)
+        return "\n".join((self._written(Format.TEXT), *(f"note: {line}" for line in self.notes)))
 
     def _written(self, how: Format) -> str:
         return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.artefacts.manifest import manifest_path, read_listed, read_manifest
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
-from navirl_cli.files import Input
+from navirl_cli.files import MANIFEST, Input
 
 if TYPE_CHECKING:  # commands that only read demonstrations need neither logs nor their extraction
     from navirl_cli.demos.extract import ExtractSettings
@@ -84,26 +85,40 @@ def gain_document(gains: "Sequence[tuple[str, Gain | None]]") -> dict[str, Any] 
 
 
 def read_demonstrations(path: Path) -> list[Demonstration]:
-    """Demonstrations of a file.
+    """Demonstrations of a file, or of all files of a folder with a manifest.
 
     Raises:
         ArtefactError: As in :func:`read_json`, or a demonstration contradicts itself.
     """
-    return demonstrations_of(read_json(path, "demonstrations"), str(path))
+    listing = manifest_path(path)
+    if listing.name != MANIFEST:
+        return demonstrations_of(read_json(path, "demonstrations"), str(path))
+    grids: dict[str, Grid] = {}
+    contents = []
+    for entry in read_manifest(listing):
+        if entry.file is not None:
+            file = listing.parent / entry.file
+            document = read_json(file, "demonstrations", entry.file_sha256)
+            contents.append((entry, demonstrations_of(document, str(file), grids)))
+    return read_listed(listing, contents)
 
 
-def demonstrations_of(document: Mapping[str, Any], path: str) -> list[Demonstration]:
+def demonstrations_of(
+    document: Mapping[str, Any], path: str, known: dict[str, Grid] | None = None
+) -> list[Demonstration]:
     """The demonstrations of a file's content.
 
     Args:
         document: As :func:`demonstrations_document` makes it.
         path: Where it comes from, for messages.
+        known: Maps by their digests, which are not made again; those of the file are added.
 
     Raises:
         ArtefactError: A demonstration contradicts itself.
     """
     try:
-        grids = {digest: _grid(content) for digest, content in document["maps"].items()}
+        grids = {} if known is None else known
+        grids.update({digest: _grid(content) for digest, content in document["maps"].items() if digest not in grids})
         found = [_read(content, grids) for content in document["demonstrations"]]
     except (NavirlError, ValueError, TypeError, KeyError, OverflowError) as error:
         raise ArtefactError(f"{path}: {error}") from error

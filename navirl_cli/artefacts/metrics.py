@@ -10,7 +10,7 @@ from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.evaluation.metrics import Metric, Values
 from navirl_cli.evaluation.paired import Interval, Paired
-from navirl_cli.evaluation.ranks import Ranking, by_group_and_training, uniformity
+from navirl_cli.evaluation.ranks import Ranking, by_group_and_training
 from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
@@ -121,7 +121,7 @@ def _ranks(ranked: Ranking) -> dict[str, Any]:
     """Ranks and their test by group."""
     groups = []
     for own in by_group_and_training(ranked.ranks):
-        statistic, p_value = uniformity(own.ranks)
+        statistic, p_value = own.uniformity()
         groups.append(
             {
                 "group": own.group,

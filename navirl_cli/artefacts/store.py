@@ -1,5 +1,6 @@
 """JSON files with a version. They are checked against their schema when they are read."""
 
+import hashlib
 import json
 import re
 from collections.abc import Mapping
@@ -17,6 +18,8 @@ from navirl_cli.artefacts.versions import VERSION, is_known, upgraded
 from navirl_cli.errors import ArtefactError, brief
 from navirl_cli.files import read_regular, replacing
 
+#: The kinds of artefacts.
+KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
@@ -26,24 +29,30 @@ def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: 
 
     Args:
         path: The file.
-        artefact: "demonstrations", "reward", "metrics" or "study".
+        artefact: "demonstrations", "reward", "metrics", "study" or "manifest".
         content: Without the fields that name format and version.
         force: Whether to replace an existing file.
 
     Raises:
         ArtefactError: The file cannot be written.
     """
-    document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
     with replacing(path, force=force) as temporary:
-        temporary.write_text(json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_bytes(as_bytes(artefact, content))
 
 
-def read_json(path: Path, artefact: str) -> dict[str, Any]:
+def as_bytes(artefact: str, content: Mapping[str, Any]) -> bytes:
+    """The bytes of an artefact's file; arguments as of :func:`write_json`."""
+    document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
+    return (json.dumps(document, separators=(",", ":"), allow_nan=False) + "\n").encode()
+
+
+def read_json(path: Path, artefact: str, sha256: str | None = None) -> dict[str, Any]:
     """Read an artefact and check it against its schema.
 
     Args:
         path: The file.
         artefact: As in :func:`write_json`.
+        sha256: What its bytes must hash to; None for any.
 
     Returns:
         Its content in the present version, whichever version of navirl wrote it.
@@ -51,13 +60,54 @@ def read_json(path: Path, artefact: str) -> dict[str, Any]:
     Raises:
         ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
+    return _checked(_content(path, artefact, sha256), path, artefact)
+
+
+def read_any(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read an artefact of any kind.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its kind, as in :func:`write_json`, and its content as of :func:`read_json`.
+
+    Raises:
+        ArtefactError: As in :func:`read_json`.
+    """
+    document = _content(path, " or ".join(KINDS))
+    found = document.get("format") if isinstance(document, dict) else None
+    kind = next((kind for kind in KINDS if found == f"navirl/{kind}"), None)
+    if kind is None:
+        what = f"format {brief(found)}" if isinstance(found, str) else "other JSON"
+        raise ArtefactError(f"{path}: expected a file of navirl {' or '.join(KINDS)}, found {what}")
+    return kind, _checked(document, path, kind)
+
+
+def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
+    """The content of a JSON file; arguments as of :func:`read_json`.
+
+    Raises:
+        ArtefactError: It cannot be read.
+    """
     try:
-        document = _parsed(read_regular(path).decode("utf-8"))
+        data = read_regular(path)
+        if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+            raise ArtefactError(f"{path}: expected the bytes that the manifest names, found others; extract again")
+        return _parsed(data.decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
         raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
+
+
+def _checked(document: Any, path: Path, artefact: str) -> dict[str, Any]:
+    """A file's content in the present version, checked.
+
+    Raises:
+        ArtefactError: It is another artefact, or does not fit the schema.
+    """
     found = document.get("format") if isinstance(document, dict) else None
     if found != f"navirl/{artefact}":
         what = f"a file of format {brief(found)}" if isinstance(found, str) else "other JSON"
@@ -79,7 +129,11 @@ def _parsed(text: str) -> Any:
     """
     document = json.loads(text, parse_constant=_refuse_constant)
     if _SURROGATE.search(text):
-        json.dumps(document, ensure_ascii=False).encode("utf-8")
+        try:
+            json.dumps(document, ensure_ascii=False).encode("utf-8")
+        except UnicodeEncodeError as error:
+            half = ascii(error.object[error.start])[1:-1]
+            raise ValueError(f"{half}, half of a surrogate pair, which no text has; write the file again") from error
     return document
 
 

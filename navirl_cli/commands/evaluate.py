@@ -10,6 +10,7 @@ import click
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -25,15 +26,16 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.commands.types import Choice, FilePath, Number
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, refuse_unused, section
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import unknown
 from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import FIELDS, groups_named
+from navirl_cli.evaluation.groups import groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
 from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
+from navirl_cli.evaluation.ranks import Ranking, check_to_rank, chosen_to_rank, ranking
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
 
@@ -68,6 +70,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
     ],
 )
 @click.argument("demos", metavar="DEMOS", required=False, type=FilePath)
+@choice_options(reward=True)
 @section(
     "Metrics",
     click.option(
@@ -142,6 +145,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
 )
 def evaluate(
     demos: Path | None,
+    choosing: Choosing,
     rewards: tuple[Path, ...],
     person: str | None,
     metrics: tuple[Metric, ...],
@@ -175,11 +179,14 @@ def evaluate(
         raise click.UsageError("--person goes with --reward.")
     if output is not None:
         check_output(output, [demos, *rewards], force=force)
-    demonstrations = demonstrations_in(demos)
-    groups_named(demonstrations, [name for pair in pairs for name in pair], fields, "pair")  # refuses unknown ones
-    files = {path.stem: read_reward_for(path, demonstrations, person) for path in rewards}
+    everyone = demonstrations_in(demos)
+    files = {path.stem: read_reward_for(path, everyone, person) for path in rewards}
+    trained = next(iter(files.values())).trained(everyone) if ranks else None
+    named = [name for pair in pairs for name in pair]
+    also = [one for own in groups_named(choosing.subset.of(everyone), named, fields, "pair") for one in own]
+    also += chosen_to_rank(everyone, trained)[0] if ranks else []
+    demonstrations = choosing.of(everyone, list(files.values()), also=also)
     learnt = {name: one.reward for name, one in files.items()}
-    trained = next(iter(files.values())).trained(demonstrations) if ranks else None
     if ranks:
         check_to_rank(demonstrations, trained)
     rng, precision = np.random.default_rng(seed), Precision(samples, error)
@@ -219,6 +226,7 @@ def _list_metrics(how: Format, *, as_json: bool) -> None:
 
 def _check_arguments(rewards: Sequence[Path], pairs: Sequence[tuple[str, str]], *, ranks: bool) -> None:
     """Refuse options that are invalid whatever the files hold."""
+    refuse_unused("--reward", "samples", "error", "everything", used=bool(rewards))
     if ranks and len(rewards) != 1:
         raise click.UsageError("--ranks needs one --reward.")
     stems = [path.stem for path in rewards]

@@ -1,11 +1,16 @@
 """``navirl extract``: logs to demonstrations."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
+from navirl_cli.artefacts.manifest import Entry
+from navirl_cli.artefacts.many import Folder, check_some
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands.shared import (
     bytes_bar,
     check_output,
@@ -19,13 +24,13 @@ from navirl_cli.commands.shared import (
     logs_argument,
     merged,
     namespace_option,
-    output_option,
     say,
     split_option,
     topic_option,
     topics_by_role,
+    workers_options,
 )
-from navirl_cli.commands.types import Choice, Count, FilePath, Number, Point
+from navirl_cli.commands.types import Choice, Count, FileOrFolder, FilePath, Number, Output, Point
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.demonstration import Condition
@@ -40,14 +45,17 @@ from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.roles.clocks import TimeSource
 from navirl_cli.logs.roles.session import MOST_CYCLES
-from navirl_cli.reports.extraction import gain_table, published_notes, trial_table
+from navirl_cli.reports.extraction import gain_table, log_table, published_notes, trial_table
 
 
 @click.command(
     cls=Command,
     examples=[
         Example("A trial for each goal that the logs announce", "navirl extract p01.mcap p02.mcap -o demos.json"),
-        Example("All logs of a folder, with a named topic", "navirl extract logs --topic wrench=/wrench -o demos.json"),
+        Example(
+            "A file for each log of a folder, where it is new or has changed; with a named topic",
+            "navirl extract logs --topic wrench=/wrench -o demos/",
+        ),
         Example("Labels of each trial from a table", "navirl extract p01.mcap --trials trials.csv -o demos.json"),
     ],
 )
@@ -146,10 +154,23 @@ from navirl_cli.reports.extraction import gain_table, published_notes, trial_tab
         help="Radius by which the map is inflated, m.  [default: from the log's session record, else 0.3]",
     ),
 )
-@section("Output", output_option("Demonstrations file to write."), json_option, force_option)
+@workers_options
+@section(
+    "Output",
+    click.option(
+        "-o",
+        "--output",
+        required=True,
+        type=FileOrFolder(),
+        help="Demonstrations file to write; or a folder (an existing one, or a name that ends in /) for one file a log "
+        "and a manifest. In a folder, logs that have not changed are not read again.",
+    ),
+    json_option,
+    force_option,
+)
 def extract(
     logs: tuple[Path, ...],
-    output: Path,
+    output: Output,
     split: str,
     trials: Path | None,
     participant: str | None,
@@ -175,6 +196,8 @@ def extract(
     time_source: str,
     join: bool,
     strict: bool,
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -195,7 +218,8 @@ def extract(
     if no_wrench and (gain or wrench_frame or force_scale != 1 or "wrench" in chosen):
         raise click.UsageError("--no-wrench excludes --gain, --wrench-frame, --force-scale and --topic wrench=/NAME.")
     files = [one for one in (map_file, trials) if one is not None]
-    check_output(output, [*logs, *files], force=force)
+    if not output.is_folder:
+        check_output(output.path, [*logs, *files], force=force)
     settings = ExtractSettings(
         split=Split(split),
         resolution_m=resolution,
@@ -223,14 +247,23 @@ def extract(
         strict=strict,
     )
     labels = None if trials is None else read_labels(trials)
-    with bytes_bar("extract") as update:
-        found = extract_recordings(logs, settings, options, join=join, labels=labels, progress=update)
+    said = settings_document(settings, options, map_file, trials)
+    if output.is_folder:
+        folder = Folder(output.path, settings, options, said, list(map(Input.of, files)))
+        with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+            entries = folder.extract(logs, labels=labels, join=join, force=force, executor=executor, progress=update)
+        _report_folder(folder, entries, as_json=as_json)
+        return
+    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+        found = extract_recordings(
+            logs, settings, options, join=join, labels=labels, executor=executor, progress=update
+        )
     demonstrations = found.demonstrations()
     inputs = [*found.inputs, *map(Input.of, files)]
-    document = demonstrations_document(demonstrations, inputs, settings_document(settings, options, map_file, trials))
+    document = demonstrations_document(demonstrations, inputs, said)
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
-    write_json(output, "demonstrations", document, force=force)
+    write_json(output.path, "demonstrations", document, force=force)
     table, gains = trial_table(demonstrations), document.get("gain")
     if as_json:
         echo_json({"trials": table.records(), "gain": gains})
@@ -239,3 +272,16 @@ def extract(
     for line in merged([*found.notes(demonstrations), *published_notes(found.extractions)]):
         say(line)
     finish(found.lost)
+
+
+def _report_folder(folder: Folder, entries: Sequence[Entry], *, as_json: bool) -> None:
+    """What became of many logs."""
+    check_some(entries)
+    if as_json:
+        echo_json({"logs": [asdict(one) for one in entries], "unchanged": folder.unchanged})
+    else:
+        echo(to_text([log_table(entries, folder.unchanged)]))
+    for line in merged([note for one in entries for note in one.notes]):
+        say(line)
+    lost = [line for one in entries for line in one.lost]
+    finish([*(f"left out: {one.reason}" for one in entries if one.reason is not None), *lost])

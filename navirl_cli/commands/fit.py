@@ -9,7 +9,9 @@ import click
 from navirl_cli.artefacts.persons import whose
 from navirl_cli.artefacts.rewards import read_prior_for, read_reward, reward_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     check_output,
@@ -24,6 +26,7 @@ from navirl_cli.commands.shared import (
     progress_bar,
     say,
     seed_option,
+    workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
 from navirl_cli.commands.usage import Command, Example, as_options, section
@@ -135,6 +138,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     ),
     seed_option,
 )
+@workers_options
 @section("Output", output_option("Reward file to write."), json_option, force_option)
 def fit(
     demos: Path,
@@ -146,8 +150,7 @@ def fit(
     pool: str,
     l2: float,
     method: str,
-    conditions: tuple[str, ...],
-    cycle: int | None,
+    choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
     steps: str,
@@ -158,6 +161,8 @@ def fit(
     profiles: tuple[str, ...],
     cross_validate: str | None,
     seed: int,
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -178,8 +183,7 @@ def fit(
     everyone = demonstrations_in(demos)
     selected = select(
         of_participant(everyone, person),
-        conditions=conditions,
-        cycle=cycle,
+        choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
@@ -193,14 +197,12 @@ def fit(
         say(line)
     plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
     effect = reach_effect(chosen, plain, Steps(steps), reach)
-    found, analyses, lost = answers(
-        evidence,
-        plain,
-        questions,
-        others=None if earlier is None else earlier.others,
-        whole_paths=Steps(steps) is Steps.ALL,
-        bars=progress_bar,
-    )
+    with workers_of(workers, cluster) as executor:
+        whole = Steps(steps) is Steps.ALL
+        others = None if earlier is None else earlier.others
+        found, analyses, lost = answers(
+            evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
+        )
     document = reward_document(
         found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )
@@ -211,7 +213,7 @@ def fit(
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
     for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
         say(line)
     finish(lost)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from navirl_cli.cluster import workers_of
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     demonstrations_in,
@@ -14,6 +16,7 @@ from navirl_cli.commands.shared import (
     json_option,
     progress_bar,
     say,
+    workers_options,
 )
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.text import to_text
@@ -46,17 +49,19 @@ from navirl_cli.reports.models import models_document, models_lost, models_remar
     ),
     l2_option,
 )
+@workers_options
 @section("Output", json_option)
 def models(
     demos: Path,
-    conditions: tuple[str, ...],
-    cycle: int | None,
+    choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
     steps: str,
     reach: float | None,
     models: tuple[tuple[Term, ...], ...],
     l2: float,
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
 ) -> None:
     """Compare rewards by how well they predict participants left out.
@@ -67,8 +72,7 @@ def models(
         raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
         demonstrations_in(demos),
-        conditions=conditions,
-        cycle=cycle,
+        choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
@@ -78,8 +82,8 @@ def models(
         say(line)
     chosen = models or MODELS
     people = len(selected.evidence.several_people("models"))
-    with progress_bar("fit", (people + 1) * len(chosen)) as update:
-        found = compare_models(selected.evidence, chosen, l2, progress=update)
+    with workers_of(workers, cluster) as executor, progress_bar("fit", (people + 1) * len(chosen)) as update:
+        found = compare_models(selected.evidence, chosen, l2, executor=executor, progress=update)
     if as_json:
         echo_json(models_document(found, l2))
     else:

@@ -7,6 +7,7 @@ import click
 
 from navirl_cli.artefacts.rewards import check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -34,9 +35,19 @@ from navirl_cli.files import Input, replacing
 )
 @demos_argument
 @click.argument("reward", type=FilePath)
+@choice_options(reward=True)
 @section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
-def report(demos: Path, reward: Path, person: str | None, output: Path, samples: int, seed: int, force: bool) -> None:
+def report(
+    demos: Path,
+    reward: Path,
+    choosing: Choosing,
+    person: str | None,
+    output: Path,
+    samples: int,
+    seed: int,
+    force: bool,
+) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
     The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
@@ -54,10 +65,11 @@ def report(demos: Path, reward: Path, person: str | None, output: Path, samples:
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
-    demonstrations = demonstrations_in(demos)
+    everyone = demonstrations_in(demos)
     content = reward_content(reward, person)
     learnt = learnt_of(content, str(reward))
-    check_cells(learnt, demonstrations, str(reward))
+    check_cells(learnt, everyone, str(reward))
+    demonstrations = choosing.of(everyone, [learnt])
     rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(

@@ -12,7 +12,7 @@ import click
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.commands import completion
 from navirl_cli.commands.types import Choice, Count, FilePath, OutputPath, Point, RoleTopic
-from navirl_cli.commands.usage import Function, as_options
+from navirl_cli.commands.usage import Function, as_options, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.inline import printable
@@ -55,6 +55,16 @@ namespace_option = click.option(
     "--namespace", metavar="/ROBOT", help="The robot's namespace, in a log of several robots, e.g. /robot1."
 )
 frame_option = click.option("--frame", help="Frame of all results, instead of the map's frame.")
+#: Where independent pieces of the work are done.
+workers_options = section(
+    "Processes",
+    click.option(
+        "--workers",
+        type=Count(1, 4096),
+        help="Number of processes for independent parts.  [default: one for each core]",
+    ),
+    click.option("--cluster", metavar="ADDRESS", help="Running Dask scheduler to give them to, e.g. tcp://host:8786."),
+)
 split_option = click.option(
     "--split",
     type=Choice([split.value for split in Split]),
@@ -191,25 +201,27 @@ def finish(lost: Sequence[str]) -> None:
 
 
 @contextmanager
-def bytes_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
     """A progress bar over the bytes of logs in sequence, if stderr is a terminal.
 
     Args:
         label: The present work.
 
     Yields:
-        A function that takes the bytes done and the total bytes.
+        A function that takes the bytes done, the total bytes and, if it likes, a short text.
     """
     if not sys.stderr.isatty():
-        yield lambda _done, _total: None
+        yield lambda _done, _total, _word="": None
         return
-    with _finished(click.progressbar(length=1, label=label, file=sys.stderr, width=30)) as bar:
+    with _finished(
+        click.progressbar(length=1, label=label, file=sys.stderr, width=30, item_show_func=lambda word: word or None)
+    ) as bar:
 
-        def update(done: int, total: int) -> None:
+        def update(done: int, total: int, word: str = "") -> None:
             if done < bar.pos:
                 bar.pos = 0
             bar.length = max(total, 1)
-            bar.update(done - bar.pos)
+            bar.update(done - bar.pos, word)
 
         yield update
 

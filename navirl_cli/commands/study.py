@@ -1,6 +1,7 @@
 """``navirl study``: the paper's evaluation over the logs of a whole study."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands.learning import terms_option
 from navirl_cli.commands.shared import (
     bytes_bar,
@@ -28,6 +30,7 @@ from navirl_cli.commands.shared import (
     seed_option,
     topic_option,
     topics_by_role,
+    workers_options,
 )
 from navirl_cli.commands.types import Count, FilePath
 from navirl_cli.commands.usage import Command, Example, section
@@ -65,6 +68,7 @@ REPORT, PAGE, SUMMARY, DEMOS = "report.md", "report.html", "summary.json", "demo
     click.option("--levels", default=5, show_default=True, type=Count(2, 11), help="Answers are from 1 to this."),
 )
 @section("Learnt paths", terms_option(), samples_option(), seed_option)
+@workers_options
 @section(
     "Output",
     output_option("Folder to write; created if it does not exist."),
@@ -80,6 +84,8 @@ def study(
     samples: int,
     seed: int,
     topics: tuple[tuple[str, str], ...],
+    workers: int | None,
+    cluster: str | None,
     as_json: bool,
     force: bool,
 ) -> None:
@@ -106,9 +112,9 @@ def study(
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
     _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)
-    with swapped_folder(output) as folder:
+    with workers_of(workers, cluster) as executor, swapped_folder(output) as folder:
         (folder / "figures").mkdir()
-        given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL))
+        given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
         demonstrations = given.demonstrations
         with progress_bar("fit", len(people_of(demonstrations)) + 1) as update:
             found = study_of(
@@ -119,6 +125,7 @@ def study(
                 terms=terms or PAPER_TERMS,
                 published=given.published,
                 progress=update,
+                executor=executor,
             )
         inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
         settings = {"samples": samples, "seed": seed, "levels": levels, "terms": names_of(found.terms)}
@@ -129,7 +136,8 @@ def study(
         write_json(folder / DEMOS, "demonstrations", kept, force=force)
         pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
-            drawn = draw_study(found, pooled, bars, folder / "figures", force=force, progress=update)
+            here = executor if cluster is None else None  # figures are files of this machine
+            drawn = draw_study(found, pooled, bars, folder / "figures", force=force, progress=update, executor=here)
         problems = [line for one in (*found.participants, found.pooled) for line in one.problems]
         lost = [*given.lost, *problems, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]
@@ -161,7 +169,7 @@ class _Given:
     lost: list[str]
 
 
-def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
+def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _Given:
     """Logs extracted, or the demonstrations of a file that extract wrote."""
     if len(logs) == 1 and logs[0].suffix == ".json":
         held = demonstrations_in(logs[0])
@@ -170,7 +178,7 @@ def _given(logs: Sequence[Path], options: LoadOptions) -> _Given:
         lost = [f"left out: {one.id} is cut off" for one in held if one.truncated]
         return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, lost)
     with bytes_bar("extract") as update:
-        found = extract_recordings(logs, ExtractSettings(), options, progress=update)
+        found = extract_recordings(logs, ExtractSettings(), options, executor=executor, progress=update)
     results, demonstrations = found.extractions, found.demonstrations()
     return _Given(
         demonstrations,

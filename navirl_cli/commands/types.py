@@ -1,8 +1,9 @@
 """Types of options and arguments: valid words and shell completion."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isfinite
-from os import fsdecode
+from os import fsdecode, sep
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,27 @@ from navirl_cli.errors import ArgumentError, unknown
 
 #: Whoever reads a file says why it cannot be read, and goes on with others.
 FilePath = click.Path(path_type=Path, readable=False)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where to write."""
+
+    path: Path
+    is_folder: bool
+
+
+class FileOrFolder(click.Path):
+    """A file; or a folder, which exists or whose name ends in a slash."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Output:  # type: ignore[override]
+        """Keep the slash, which paths do not."""
+        if isinstance(value, Output):
+            return value
+        text = fsdecode(super().convert(value, param, ctx))
+        return Output(Path(text), text.endswith(("/", sep)) or Path(text).is_dir())
 
 
 class Choice(click.Choice[str]):

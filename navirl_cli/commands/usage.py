@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary
 
 import click
+from click.core import ParameterSource
 
 from navirl_cli.errors import ArgumentError
 
@@ -27,6 +28,24 @@ def as_options(text: str) -> str:
         The same with options, as in "name it with --wrench-frame". Other text in backticks is unchanged.
     """
     return _ARGUMENT.sub(lambda match: "--" + match[1].replace("_", "-"), text)
+
+
+def refuse_unused(needs: str, *names: str, used: bool) -> None:
+    """Refuse options of the command line that nothing reads.
+
+    Args:
+        needs: What they go with, such as "--reward".
+        names: Of click's parameters.
+        used: Whether it is there.
+
+    Raises:
+        UsageError: The user set one, and it is not.
+    """
+    context = click.get_current_context()
+    for param in context.command.params:
+        given = context.get_parameter_source(param.name or "") is ParameterSource.COMMANDLINE
+        if given and not used and param.name in names:
+            raise click.UsageError(f"{max(param.opts, key=len)} goes with {needs}.")
 
 
 class Example(NamedTuple):

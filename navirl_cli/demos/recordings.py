@@ -1,26 +1,38 @@
 """From the logs that a user names to demonstrations: one bad recording does not spoil the others."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from traceback import extract_tb
 
+from navirl_cli.cluster import Cluster
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings, extract, numbered
 from navirl_cli.demos.labelling import check_agreement
 from navirl_cli.demos.labels import Label, Labels, labels_by_source
-from navirl_cli.errors import DemonstrationError, LabelError, LogError, NavirlError, TruncatedError, brief, joined
+from navirl_cli.errors import (
+    DemonstrationError,
+    LabelError,
+    LogError,
+    NavirlError,
+    TruncatedError,
+    WorkerLostError,
+    brief,
+    joined,
+)
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.messages.reader import Progress
 from navirl_cli.logs.roles.topics import HOLDS
 from navirl_cli.logs.sources import Source, sources_of
-from navirl_cli.parallel import map_in_order
+from navirl_cli.parallel import as_completed
 
 #: The hashes of a recording's files, and its demonstrations.
 _Result = tuple[tuple[Input, ...], Extraction]
+#: A recording, and what is stated of its trials.
+Job = tuple[Source, tuple[Label, ...]]
 
 
 @dataclass(frozen=True)
@@ -78,18 +90,14 @@ def extract_recordings(
     Raises:
         NavirlError: No recording gave a demonstration, or labels do not fit the logs or the settings.
     """
-    refused: list[LogError] = []
-    # where all are pieces of one recording none may be missing
-    sources = sources_of(logs, join=join, refused=None if join else refused)
-    rows, label_notes = _rows(labels, sources, settings)
+    sources, refused = sources_for(logs, executor, join=join)
+    rows, label_notes = rows_of(labels, sources, settings)
     # a lone recording is read here, so that the progress can follow its bytes
     alone = len(sources) + len(refused) == 1
-    work = partial(_extracted, settings=settings, options=options, progress=progress if alone else None, alone=alone)
+    work = partial(extracted, settings=settings, options=options, progress=progress if alone else None, alone=alone)
     good: dict[tuple[str, ...], _Result] = {}
     failed: list[NavirlError] = [*refused]
-    for source, result in _counted(
-        sources, map_in_order(work, list(zip(sources, rows, strict=True)), executor), progress
-    ):
+    for source, result in zip(sources, _results(work, sources, rows, executor, progress), strict=True):
         if isinstance(result, LabelError):
             raise result
         if isinstance(result, NavirlError):
@@ -111,7 +119,18 @@ def extract_recordings(
     )
 
 
-def _rows(
+def sources_for(
+    logs: Sequence[Path | str], executor: Executor | None, *, join: bool
+) -> tuple[list[Source], list[LogError]]:
+    """The recordings among the arguments, and why others are none; arguments as in :func:`extract_recordings`."""
+    refused: list[LogError] = []
+    if isinstance(executor, Cluster):  # whose workers have another working directory
+        logs = [Path(log).absolute() for log in logs]
+    # where all are pieces of one recording none may be missing
+    return sources_of(logs, join=join, refused=None if join else refused), refused
+
+
+def rows_of(
     labels: Labels | None, sources: Sequence[Source], settings: ExtractSettings
 ) -> tuple[list[tuple[Label, ...]], list[str]]:
     """The rows of labels of each recording, and notes on the others."""
@@ -135,21 +154,29 @@ def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
     return [f"{own[0] if len(own) == 1 else f'{len(own)} logs'}: {reason}" for reason, own in ordered]
 
 
-def _counted(
-    sources: Sequence[Source], results: Iterator[_Result | NavirlError], progress: Progress | None
-) -> Iterator[tuple[Source, _Result | NavirlError]]:
-    """Sources with their results, their bytes counted as they are done."""
+def _results(
+    work: Callable[[Job], _Result | NavirlError],
+    sources: Sequence[Source],
+    rows: Sequence[tuple[Label, ...]],
+    executor: Executor | None,
+    progress: Progress | None,
+) -> list[_Result | NavirlError]:
+    """The results of sources in their order, their bytes counted as they are done."""
     sizes = [sum(path.stat().st_size for path in source.files) for source in sources]
+    found: dict[int, _Result | NavirlError] = {}
     done = 0
-    for source, size, result in zip(sources, sizes, results, strict=True):
-        yield source, result
-        done += size
+    for number, future in as_completed(work, list(zip(sources, rows, strict=True)), executor):
+        error = future.exception()
+        lost = isinstance(error, WorkerLostError)
+        found[number] = WorkerLostError(f"{sources[number].name}: {error}") if lost else future.result()
+        done += sizes[number]
         if progress is not None:
             progress(done, sum(sizes))
+    return [found[number] for number in range(len(sources))]
 
 
-def _extracted(
-    job: tuple[Source, tuple[Label, ...]],
+def extracted(
+    job: Job,
     settings: ExtractSettings,
     options: LoadOptions,
     progress: Progress | None,

@@ -1,24 +1,18 @@
 """Groups of demonstrations: who belongs to which, and mean and spread over a group or over participants."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent
 from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.evaluation.metrics import Values
 
 #: Of all intervals.
 LEVEL = 0.95
-#: By what demonstrations can be grouped.
-FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
-    "condition": lambda one: one.condition.value,
-    "cycle": lambda one: "no cycle" if one.cycle is None else f"cycle {one.cycle}",
-    "set": lambda one: one.set or "main task",
-    "participant": lambda one: one.participant,
-}
 
 
 @dataclass(frozen=True, eq=False)

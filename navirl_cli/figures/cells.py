@@ -59,6 +59,8 @@ class CellOptions(TypedDict, total=False):
     title: str
     #: Whether to put a legend below; default True.
     legend: bool
+    #: Whether people hide the colours below them; default False.
+    opaque_people: bool
 
 
 @dataclass(frozen=True)
@@ -231,7 +233,8 @@ def draw_over(
     lines = draw_overlays(axes, overlays)
     nominal = draw_nominal(axes, scene.nominal_line_m())
     places = Places(ends[:1], ends[1:], scene.people_m, options.get("robot_radius_m"))
-    marks = draw_marks(axes, window, places, nominal=nominal, title=options.get("title", ""))
+    opaque = options.get("opaque_people", False)
+    marks = draw_marks(axes, window, places, nominal=nominal, title=options.get("title", ""), opaque=opaque)
     if options.get("legend", True):
-        legend_below(axes, [*overlay_handles(overlays), *marks.handles()])
+        legend_below(axes, overlay_handles(overlays), marks.handles())
     return obstacles, nominal, marks, lines

@@ -52,10 +52,37 @@ def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[D
     return [other for other in demonstrations if _same_task(other, one)]
 
 
+def driven(
+    demonstrations: Sequence[Demonstration], one: Demonstration, *, everywhere: bool = False
+) -> tuple[list[Demonstration], str]:
+    """Demonstrations to draw over the scene of one, and in one line what is left out.
+
+    Args:
+        demonstrations: To choose from.
+        one: Gives scene and participant.
+        everywhere: All on its map, whatever the scene and the participant.
+    """
+    if everywhere:
+        shown = [other for other in demonstrations if _map_of(other) == _map_of(one)]
+        left = len(demonstrations) - len(shown)
+        return shown, f"`overlay` all: {left} paths on other maps are left out" if left else ""
+    shown = [other for other in alike(demonstrations, one) if other.participant == one.participant]
+    left = len(demonstrations) - len(shown)
+    note = (
+        f"`overlay` demos: {len(shown)} of {len(demonstrations)} paths, those of {one.participant} in the scene of "
+        f"{one.id}; `overlay` all draws the others too"
+    )
+    return shown, note if left else ""
+
+
+def _map_of(one: Demonstration) -> tuple[object, ...]:
+    """What maps are compared by."""
+    return one.grid.shape, one.grid.resolution_m, one.grid.origin_m
+
+
 def _same_task(one: Demonstration, other: Demonstration) -> bool:
     """Whether two demonstrations are of the same task."""
-    maps = [(d.grid.shape, d.grid.resolution_m, d.grid.origin_m) for d in (one, other)]
-    if maps[0] != maps[1] or len(one.people_m) != len(other.people_m):
+    if _map_of(one) != _map_of(other) or len(one.people_m) != len(other.people_m):
         return False
     start, end = np.hypot(*(one.xy_m[[0, -1]] - other.xy_m[[0, -1]]).T)
     away = np.hypot(*(one.people_m[:, None] - other.people_m[None]).T)  # (p, p)

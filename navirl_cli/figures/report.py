@@ -7,6 +7,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import properties
+from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.profile import draw_profiles
@@ -39,8 +40,12 @@ def draw_report(
         The files by name: paths, policy, properties, and profile if there are profiles.
     """
     files = {name: folder / f"{name}.png" for name in ("paths", "policy", "properties", "profile")}
-    figure, axes = new_figure(PAGE_IN)
-    draw_paths(axes[0], demonstrations)
+    panels = panels_of(demonstrations)
+    figure, axes = new_figure(PAGE_IN, panels=max(1, len(panels)), columns=2 if panels else 1)
+    if panels:
+        draw_path_panels(axes, panels)
+    else:
+        draw_paths(axes[0], demonstrations)
     save_figure(figure, files["paths"])
     one, scene = shown
     figure, axes = new_figure(PAGE_IN, panels=2, columns=2)

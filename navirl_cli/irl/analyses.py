@@ -161,7 +161,7 @@ def answers(
         affect the fit.
     """
     if questions.person is not None and others is not None:
-        found, ends = newcomer(evidence, found, others, questions.person)
+        found, ends = newcomer(evidence, others, questions.person, found)
         return found, Analyses((ends,)), []
     if questions.pool is Pool.PERSONS:
         return _persons(evidence, found, executor, bars)

@@ -6,7 +6,7 @@ import numpy as np
 
 from navirl_cli.arrays import ByContent
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.log_scale import LogScale, Witness
 from navirl_cli.irl.nodes import draw, laplace
@@ -36,14 +36,14 @@ class Others(ByContent):
         return Prior.gaussian(theta, np.diag(errors**2))
 
 
-def newcomer(evidence: Evidence, plain: Fit, others: Others, name: str) -> tuple[Fit, Intervals]:
+def newcomer(evidence: Evidence, others: Others, name: str, plain: Fit | None = None) -> tuple[Fit, Intervals]:
     """The reward of a new person by this person's demonstrations and by the scatter between earlier people.
 
     Args:
         evidence: Demonstrations of this person alone.
-        plain: A fit to them with the Gaussian prior of :meth:`Others.prior`.
         others: Earlier people.
         name: Of the person.
+        plain: A fit to the demonstrations with the Gaussian prior of :meth:`Others.prior`, where there is one.
 
     Returns:
         The fit, whose errors are those of the person, and its intervals.
@@ -52,6 +52,8 @@ def newcomer(evidence: Evidence, plain: Fit, others: Others, name: str) -> tuple
         RewardError: The typical reward has no policy in a scene of the person.
     """
     scale, spread = others.scale, others.spread
+    if plain is None:
+        plain = fit(evidence, scale.reward, prior=others.prior(), scan=False)
     prior = Prior.l2(scale.reward.parameters, 0.0)
     one = Witness(name, evidence, scale, prior)
     known = laplace(one, spread, spread.mean)

@@ -16,7 +16,7 @@ from navirl_cli.irl.spread import Factors, Posterior, Spread
 
 #: Largest number of pairs of nodes of a person, on either side of the mode. Degrees of freedom of their distribution,
 #: whose tails are heavier than those of any posterior under a normal scatter.
-MOST_PAIRS, FREEDOM = 128, 6.0
+MOST_PAIRS, FREEDOM = 64, 6.0
 #: Even numbers keep away from 0 and 1 by this.
 TINY = 1e-6
 #: Least curvature of a posterior at its mode, as a share of that of the prior.

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import hypot, pi
 from typing import Any
 
+from navirl_cli.artefacts.manifest import Entry
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction
 from navirl_cli.demos.lines import path_length_m
@@ -30,6 +31,11 @@ _GAIN = (
     Column("pushes"),
     Column("delay_s", "delay s", decimals=2),
 )
+
+
+#: Of more logs a table lists only those without demonstrations.
+_MOST_LOGS = 100
+_LOG = (Column("log"), Column("status"), Column("trials"), Column("demonstrations"), Column("file"))
 
 
 def trial_table(demonstrations: Sequence[Demonstration]) -> Table:
@@ -70,6 +76,15 @@ def gain_table(gain: Mapping[str, Any]) -> Table:
     """
     lines = [*gain["logs"], *([{"log": "all", **gain}] if len(gain["logs"]) > 1 else [])]
     return Table(_GAIN, tuple(tuple(line[column.name] for column in _GAIN) for line in lines))
+
+
+def log_table(logs: Sequence[Entry], unchanged: int) -> Table:
+    """One row for each log; of many logs only those without demonstrations."""
+    shown = logs if len(logs) <= _MOST_LOGS else [one for one in logs if one.file is None]
+    rows = tuple((one.log, one.status, one.trials, one.demonstrations, one.file) for one in shown)
+    done = sum(one.demonstrations for one in logs)
+    note = f"{len(logs)} logs, {unchanged} of them unchanged and not read again; {done} demonstrations."
+    return Table(_LOG, rows, note=note)
 
 
 def published_notes(results: Iterable[Extraction]) -> list[str]:

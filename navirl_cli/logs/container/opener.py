@@ -138,7 +138,7 @@ class Opener:
     ) -> Iterator[Batch]:
         """Yield the batch of a channel's messages, at the offsets of a walk and of a message index."""
         listed = offsets[:0] if index is None else index[0]
-        batch = self._batch(piece, channel, opened, np.union1d(offsets, listed))
+        batch = self._batch(piece, channel, opened, _united(offsets, listed))
         found = 0 if batch is None else len(batch.starts)
         if found < len(listed) and not piece.cut:
             reason = f"the chunk's message index lists {len(listed)} messages of {channel.topic}, {found} were found"
@@ -198,6 +198,15 @@ class Opener:
             if number in self._definitions.channels and wanted(channel := self._definitions.channel(number))
         ]
         return f"{opened.error}; messages lost: {', '.join(counts) or 'an unknown number'}"
+
+
+def _united(walked: IntArray, listed: IntArray) -> IntArray:
+    """Offsets of a walk, which ascend, and of an index: ascending, each once. np.union1d hashes, 20 times slower."""
+    if not listed.size or np.array_equal(walked, listed):
+        return walked
+    both = np.sort(np.concatenate([walked, listed]), kind="stable")
+    once: IntArray = both[np.append(True, both[1:] != both[:-1])]
+    return once
 
 
 def _in_span(times: dict[int, IntArray], span_ns: tuple[int, int]) -> bool:

@@ -1,0 +1,95 @@
+"""Work on a Dask cluster: scheduler and workers are processes on loopback."""
+
+import json
+import time
+from threading import Thread
+
+import pytest
+from click.testing import CliRunner
+from dask_scheduler import scheduler
+from fleet_logs import SAMPLES, copies
+from jobs import killed, slow_double
+
+from navirl_cli import cluster
+from navirl_cli.cli import cli
+from navirl_cli.cluster import connected
+from navirl_cli.errors import ArgumentError, WorkerLostError
+from navirl_cli.parallel import as_completed, map_in_order
+
+distributed = pytest.importorskip("distributed", reason="needs navirl[cluster]")
+
+
+def invoked(*words):
+    result = CliRunner().invoke(cli, [str(word) for word in words])
+    assert result.exit_code in {0, 3}, result.output
+    return result
+
+
+def test_a_scheduler_that_is_not_there_is_named():
+    before, cluster._TIMEOUT_S = cluster._TIMEOUT_S, 0.2
+    try:
+        with (
+            pytest.raises(
+                ArgumentError, match=r"expected the address of a running scheduler, found 'tcp://127\.0\.0\.1:9'"
+            ),
+            connected("tcp://127.0.0.1:9"),
+        ):
+            pass
+    finally:
+        cluster._TIMEOUT_S = before
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A scheduler and two workers in threads of this process: the same messages, without the start of processes."""
+    with distributed.LocalCluster(
+        2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=None
+    ) as own:
+        yield own.scheduler_address
+
+
+def test_logs_give_the_same_demonstrations(address, tmp_path):
+    here, there = tmp_path / "here.json", tmp_path / "there.json"
+    invoked("extract", *SAMPLES[:2], "-o", here, "--workers", 1)
+    invoked("extract", *SAMPLES[:2], "-o", there, "--cluster", address)
+    assert there.read_bytes() == here.read_bytes()
+
+
+def test_other_versions_are_refused():
+    own = cluster.versions()
+    cluster.check(own, {"tcp://one": own}, "tcp://host")
+    said = r"expected workers with navirl \S+ as here, found navirl 0\.0\.1 at tcp://two; install the same versions$"
+    with pytest.raises(ArgumentError, match=said):
+        cluster.check(own, {"tcp://one": own, "tcp://two": {**own, "navirl": "0.0.1"}}, "tcp://host")
+    with pytest.raises(
+        ArgumentError, match="found: No module named 'navirl_cli' at tcp://one; install the same version"
+    ):
+        cluster.check(own, {"tcp://one": ModuleNotFoundError("No module named 'navirl_cli'")}, "tcp://host")
+    with pytest.raises(ArgumentError, match=r"expected workers of tcp://host, found none; start some by `dask worker"):
+        cluster.check(own, {}, "tcp://host")
+
+
+@pytest.mark.slow
+def test_forty_logs_and_a_fit_are_the_same_from_other_processes(tmp_path):
+    logs = copies(tmp_path, 40)
+    demos, there = tmp_path / "demos.json", tmp_path / "there.json"
+    rewards = tmp_path / "reward.json", tmp_path / "reward_there.json"
+    fit = ("--bootstrap", 20, "--cross-validate", "participant", "--intervals", "wald")
+    with scheduler() as (address, _):
+        invoked("extract", *logs, "-o", demos, "--workers", 1)
+        invoked("extract", *logs, "-o", there, "--cluster", address)
+        assert there.read_bytes() == demos.read_bytes()
+        invoked("fit", demos, *fit, "-o", rewards[0], "--workers", 1)
+        invoked("fit", demos, *fit, "-o", rewards[1], "--cluster", address)
+    assert json.loads(rewards[1].read_text()) == json.loads(rewards[0].read_text())
+
+
+@pytest.mark.slow
+def test_a_killed_worker_changes_nothing_and_a_killing_item_is_lost():
+    with scheduler(workers=5) as (address, workers), connected(address) as executor:
+        Thread(target=lambda: (time.sleep(0.5), workers[0].kill())).start()
+        assert list(map_in_order(slow_double, list(range(300)), executor)) == list(range(0, 600, 2))
+        found = dict(as_completed(killed, [(number, None) for number in range(12)], executor))
+        with pytest.raises(WorkerLostError, match="2 workers ended that worked on this"):
+            found.pop(5).result()
+        assert [found[number].result() for number in sorted(found)] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
