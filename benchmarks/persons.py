@@ -15,7 +15,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -35,7 +34,7 @@ from navirl_cli.irl.intervals import Kind, intervals
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.population import population
 from navirl_cli.irl.reward import Reward
-from navirl_cli.parallel import map_in_order
+from navirl_cli.parallel import Local, map_in_order
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from factories import drawn
@@ -47,12 +46,6 @@ NAMES = ("c0", "a_g", "a_p", "sigma_p")
 PEOPLE, QUICK_PEOPLE, SETS = 36, 18, 8
 #: Least share of intervals that cover, and the most seconds of a fit of 13 people.
 COVERING, SECONDS = 0.85, 20.0
-
-
-class Here(Executor):
-    """This process, because the sets are shared out already."""
-
-    map = staticmethod(map)  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
@@ -111,7 +104,7 @@ def fitted(seed: int, count: int) -> Fitted:
     evidence = evidence_of(demonstrations)
     pooled = fit(evidence, Reward.named({}))
     begun = time.process_time()
-    typical, found, ends = population(evidence, pooled, executor=Here())
+    typical, found, ends = population(evidence, pooled, executor=Local(1))
     cpu_s = time.process_time() - begun
     of_pooled, of_typical = (
         {one.parameter: one for one in some.ends} for some in (intervals(evidence, pooled, Kind.WALD)[0], ends)
@@ -186,7 +179,7 @@ def predicted(job: tuple[Evidence, int]) -> list[float]:
     own = np.array([one == evidence.participants[left_out] for one in evidence.participants])
     rest, test = evidence.repeated((~out).astype(int)), evidence.repeated(out.astype(int))
     pooled = fit(rest, start)
-    typical, found, _ = population(rest, pooled, executor=Here())
+    typical, found, _ = population(rest, pooled, executor=Local(1))
     person = next(one for one in found.persons if one.name == evidence.participants[left_out])
     rewards = (
         fit(evidence.repeated((~own).astype(int)), start).reward,

@@ -17,15 +17,10 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
 from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.status import Status
+from navirl_cli.parallel import Local
 
 TRUTH = np.array([-40.0, -2.0, -5.0, 2.0])
 SCATTER = 0.25
-
-
-class Here:
-    """An executor of this thread."""
-
-    map = staticmethod(map)
 
 
 def people(count, each=2, seed=1):
@@ -46,7 +41,7 @@ def people(count, each=2, seed=1):
 def found():
     evidence = evidence_of(people(6))
     pooled = fit(evidence, Reward.named({}))
-    return evidence, pooled, *population(evidence, pooled, executor=Here())
+    return evidence, pooled, *population(evidence, pooled, executor=Local(1))
 
 
 def test_population_has_a_typical_reward_and_one_for_each_person(found):

@@ -12,12 +12,7 @@ from navirl_cli.irl.nodes import draw, laplace, scattered
 from navirl_cli.irl.random_effects import random_effects
 from navirl_cli.irl.restricted import LEAST, WIDTH, Restricted
 from navirl_cli.irl.spread import Factors, Spread
-
-
-class Here:
-    """An executor of this thread."""
-
-    map = staticmethod(map)
+from navirl_cli.parallel import Local
 
 
 @dataclass
@@ -68,7 +63,7 @@ def bells(count=12, seed=0, scatter=(0.3, 0.2)):
 def test_lopsided_people_are_those_of_a_grid():
     rng = np.random.default_rng(3)
     people = [Lopsided(float(rng.normal(1.0, 0.5)), float(rng.uniform(4, 12))) for _ in range(10)]
-    found = random_effects(people, np.array([1.0]), executor=Here())
+    found = random_effects(people, np.array([1.0]), executor=Local(1))
     places = np.linspace(-3, 4, 500)
     logs = np.array([[one.value(np.array([y])) for y in places] for one in people])
     twin = oracles.scattered_people(
@@ -101,7 +96,7 @@ def test_a_posterior_under_a_spread_is_that_of_a_grid():
 
 def test_gaussian_people_with_much_information_scatter_as_they_do():
     people = [Bell(one.at, one.precision * 1e4) for one in bells()]
-    found = random_effects(people, np.zeros(2), width=1e6, executor=Here())
+    found = random_effects(people, np.zeros(2), width=1e6, executor=Local(1))
     at = np.array([one.at for one in people])
     mean, _ = found.mixture.typical()
     assert mean == pytest.approx(at.mean(axis=0), abs=1e-3)
@@ -113,7 +108,7 @@ def test_gaussian_people_with_much_information_scatter_as_they_do():
 
 def test_people_who_are_alike_are_not_said_to_differ():
     alike = [Bell(one.at, one.precision) for one in bells(scatter=(0.0, 0.0), seed=5)]
-    found = random_effects(alike, np.zeros(2), executor=Here())
+    found = random_effects(alike, np.zeros(2), executor=Local(1))
     assert not found.mixture.differ.any()
     at = np.array([one.at for one in alike])
     mean, _ = found.mixture.typical()
