@@ -25,6 +25,7 @@ SLOW = {
     "nav2-study.md",
     "other-rewards.md",
     "plan.md",
+    "persons.md",
     "published-study.md",
     "several-rewards.md",
     "visit.md",

@@ -27,6 +27,8 @@ from navirl_cli.api.given import (
     demonstrations_in,
     files_behind,
     learnt_in,
+    of_one,
+    prior_in,
     reward_in,
     sources_behind,
 )
@@ -38,6 +40,7 @@ from navirl_cli.artefacts.demonstrations import (
     settings_document,
 )
 from navirl_cli.artefacts.metrics import metrics_document
+from navirl_cli.artefacts.persons import whose
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
 from navirl_cli.cluster import workers_of
 from navirl_cli.demos.contact import PushSettings
@@ -62,7 +65,7 @@ from navirl_cli.irl.intervals import ASKED, Kind
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
-from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.logs.load import Forces, LoadOptions
@@ -256,6 +259,7 @@ def fit(
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
+    person: str | None = None,
     pool: str = "all",
     l2: float = PAPER_L2,
     method: str = "newton",
@@ -289,6 +293,9 @@ def fit(
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
+        person: Learn the reward of this participant from the own demonstrations and the prior, a reward fitted with
+            ``pool="persons"``. The prior of a new person is how people are scattered, that of a known one the own
+            reward.
         pool: "all": one reward for all participants; "persons": a typical one, and one for each person (random effects
             on the logarithms of the parameters).
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
@@ -337,6 +344,7 @@ def fit(
         seed,
         None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
         chosen(Pool, pool, "pool"),
+        person,
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
@@ -344,14 +352,14 @@ def fit(
     subset = subset_in(condition, cycle, set, participant, trial)
     reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
-        demos,
+        of_participant(demos, person),
         subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=which,
         reach_m=reach_m,
     )
-    earlier = None if prior is None else learnt_in(prior)
+    earlier = None if prior is None else prior_in(prior, person)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")
     given = init if init is None or isinstance(init, Mapping) else reward_in(init)
@@ -361,17 +369,22 @@ def fit(
         selected.evidence,
         start,
         weight,
-        prior=None if earlier is None else earlier.as_prior(),
+        prior=None if earlier is None else earlier.as_prior(person),
         method=chosen(Method, method, "method"),
     )
     effect = reach_effect(selected.demonstrations, found, which, reach_m)
     with _executor(executor, workers, cluster) as where:
         whole = which is Steps.ALL
-        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=where)
+        others = None if earlier is None else earlier.others
+        found, analyses, lost = answers(
+            selected.evidence, found, questions, others=others, whole_paths=whole, executor=where
+        )
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
     )
+    if person is not None and earlier is not None:
+        document |= whose(person, earlier.participants)
     notes = (
         *cannot_learn(selected.demonstrations),
         *remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos),
@@ -390,6 +403,7 @@ def evaluate(
     demos: PathLike | Sequence[Demonstration] | Mapping[str, PathLike | Sequence[Demonstration]],
     reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
     *,
+    person: str | None = None,
     metrics: str | Sequence[str] = (),
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
@@ -411,6 +425,7 @@ def evaluate(
     Args:
         demos: Demonstrations, or their file; or several by name, whose groups of the same name are compared.
         reward: A reward, its file, values by name of parameter; or several rewards by name.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         metrics: Names of metrics, or "all"; the paper's three by default.
         condition: Only trials of these conditions, as of :func:`fit`; so are cycle, set, participant and trial.
         cycle: Only trials of these cycles.
@@ -442,7 +457,7 @@ def evaluate(
     given = {str(n): one for n, one in demos.items()} if isinstance(demos, Mapping) else {"demos": demos}
     files = {name: demonstrations_in(one) for name, one in given.items()}
     everyone = [one for own in files.values() for one in own]
-    rewards = _rewards(reward, everyone)
+    rewards = _rewards(reward, everyone, person)
     if ranks and not len(rewards) == len(files) == 1:
         raise ArgumentError("`ranks` needs one `reward` and one file of demonstrations")
     measured = _metrics(metrics)
@@ -467,12 +482,13 @@ def evaluate(
     return Evaluation(found.result, measured, found.pairs, found.ranked, document, asked.notes, shares)
 
 
-def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> ScenePolicy:
+def policy(reward: PathLike | AnyReward, demonstration: Demonstration, *, person: str | None = None) -> ScenePolicy:
     """The policy of a reward in the scene of a demonstration.
 
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
 
     Returns:
         Expected visits, soft value, reward and probabilities as arrays over the map, and paths to draw.
@@ -486,7 +502,7 @@ def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> SceneP
         >>> where.visits.shape == where.grid.shape
         True
     """
-    learnt = reward_in(reward, [demonstration])
+    learnt = reward_in(of_one(reward, person), [demonstration])
     scene = scenes_of([demonstration])[0]
     return ScenePolicy(demonstration, learnt, scene, policy_of(learnt, scene))
 
@@ -514,13 +530,18 @@ def _executor(executor: Executor | None, workers: int | None, cluster: str | Non
 
 
 def _rewards(
-    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None, demos: Sequence[Demonstration]
+    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None,
+    demos: Sequence[Demonstration],
+    person: str | None,
 ) -> dict[str, Reward | LearntReward]:
     """Rewards by name; one alone is named "learnt"."""
     if reward is None:
+        if person is not None:
+            raise ArgumentError("`person` goes with `reward`")
         return {}
     several = isinstance(reward, Mapping) and not all(isinstance(value, int | float) for value in reward.values())
     named: Mapping[str, Any] = reward if several else {LEARNT: reward}  # type: ignore[assignment]
+    named = {name: of_one(one, person) for name, one in named.items()}
     for one in named.values():
         reward_in(one, demos)
     files = str | Path | LearntReward

@@ -14,7 +14,7 @@ import numpy as np
 
 from navirl_cli.api.arguments import one_of, subset_in, texts, within
 from navirl_cli.api.calls import policy as policy_in
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, reward_in
+from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
 from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
@@ -106,6 +106,7 @@ def policy(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -119,6 +120,7 @@ def policy(
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the likely paths.
         overlay: Draw paths over the map: "demos" (in this scene by this participant), "all" (all of demos on this
@@ -134,7 +136,7 @@ def policy(
     Raises:
         NavirlError: The scene has no policy under the reward, or the figure cannot be written.
     """
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), _own(axes), page)[
         0
@@ -145,6 +147,7 @@ def reward(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -154,7 +157,7 @@ def reward(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     by_cell = view.reward.by_cell(view.scene)
     return _drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), _own(axes), page)[0]
@@ -164,6 +167,7 @@ def value(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -173,7 +177,7 @@ def value(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), _own(axes), page
@@ -184,6 +188,7 @@ def actions(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -193,7 +198,7 @@ def actions(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_actions(
@@ -208,6 +213,7 @@ def properties(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward | None = None,
     *,
+    person: str | None = None,
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
     set: str | Collection[str] = (),  # noqa: A002 the option's name
@@ -224,6 +230,7 @@ def properties(
     Args:
         demos: Demonstrations, or their file.
         reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
         cycle: Only trials of these cycles.
         set: Only trials of these sets.
@@ -242,6 +249,9 @@ def properties(
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
     everyone = demonstrations_in(demos)
+    if person is not None and reward is None:
+        raise ArgumentError("`person` goes with `reward`")
+    reward = None if reward is None else of_one(reward, person)
     trained = [] if reward is None else [_trained(reward, everyone)]
     subset = subset_in(condition, cycle, set, participant, trial)
     demonstrations = choose(everyone, subset, trained, everything=all).demonstrations
@@ -276,6 +286,7 @@ def ranks(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward,
     *,
+    person: str | None = None,
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
     set: str | Collection[str] = (),  # noqa: A002 the option's name
@@ -292,6 +303,7 @@ def ranks(
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
+        person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
         cycle: Only trials of these cycles.
         set: Only trials of these sets.
@@ -311,6 +323,7 @@ def ranks(
             the figure cannot be written.
     """
     everyone, subset = demonstrations_in(demos), subset_in(condition, cycle, set, participant, trial)
+    reward = of_one(reward, person)
     parameters, trained = reward_in(reward, everyone), _trained(reward, everyone)
     demonstrations = choose(everyone, subset, everything=all).demonstrations
     if names := texts(group):

@@ -11,7 +11,8 @@ import numpy as np
 from navirl_cli.api.arguments import subset_in
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.demonstrations import demonstrations_document
-from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.artefacts.persons import of_person
+from navirl_cli.artefacts.rewards import LearntReward, learnt_of
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
@@ -31,7 +32,7 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
 from navirl_cli.reports.evaluation import evaluation_text, write_evaluation
 from navirl_cli.reports.extraction import trial_table
-from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit import report, warnings
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -197,6 +198,15 @@ class FittedReward(LearntReward):
         if name not in values:
             raise ArgumentError(unknown("parameter", name, values))
         return values[name]
+
+    def person(self, name: str) -> "FittedReward":
+        """The own reward of one of :attr:`persons`, after a fit with ``pool="persons"``.
+
+        Raises:
+            ArtefactError: There is no reward of this person.
+        """
+        content = of_person(self.document or {}, name, "reward")
+        return FittedReward.of(learnt_of(content, "reward"), content, notes=tuple(warnings(content)), file=self.file)
 
     def __repr__(self) -> str:
         """The parameters and how the fit ended, as ``navirl fit`` prints them."""

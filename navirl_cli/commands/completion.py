@@ -113,6 +113,17 @@ def terms(_ctx: click.Context, incomplete: str) -> Iterator[str]:
 
 
 @_proposed
+def persons(ctx: click.Context, _incomplete: str) -> Iterable[str]:
+    """The people whose rewards the reward files on the command line hold."""
+    from navirl_cli.artefacts.persons import names_of_persons
+    from navirl_cli.artefacts.rewards import reward_content
+
+    files = ctx.params.get("rewards") or ctx.params.get("reward") or ctx.params.get("prior_file")
+    for path in files if isinstance(files, tuple) else (files,):
+        yield from names_of_persons(reward_content(path))
+
+
+@_proposed
 def metrics(_ctx: click.Context, incomplete: str) -> Iterator[str]:
     """A list of metrics extended by each missing one, or all."""
     from navirl_cli.evaluation.metrics import BY_NAME

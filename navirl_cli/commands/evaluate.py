@@ -20,6 +20,7 @@ from navirl_cli.commands.shared import (
     force_option,
     json_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
     say,
@@ -126,6 +127,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         type=FilePath,
         help="Learnt reward, to measure the paths of its policy too; repeatable.",
     ),
+    person_option,
     samples_option(),
     click.option(
         "--precision",
@@ -178,6 +180,7 @@ def evaluate(
     demos: tuple[Path, ...],
     choosing: Choosing,
     rewards: tuple[Path, ...],
+    person: str | None,
     metrics: tuple[Metric, ...],
     list_metrics: bool,
     fields: tuple[str, ...],
@@ -208,11 +211,12 @@ def evaluate(
         _list_metrics(Format(style), as_json=as_json)
         return
     _check_arguments(demos, rewards, pairs, ranks=ranks)
+    refuse_unused("--reward", "person", used=bool(rewards))
     outputs = [path for path in (output, per_trial) if path is not None]
     for path in outputs:
         check_output(path, [*demos, *rewards], force=force)
     everyone = dict(zip(_names(demos), map(demonstrations_in, demos), strict=True))
-    learnt = {path.stem: _reward_for(path, everyone) for path in rewards}
+    learnt = {path.stem: _reward_for(path, everyone, person) for path in rewards}
     trained = [one.trained([d for own in everyone.values() for d in own]) for one in learnt.values()]
     asked = asked_of(
         everyone,
@@ -263,9 +267,9 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [path.stem if stems.count(path.stem) == 1 else str(path) for path in paths]
 
 
-def _reward_for(path: Path, files: Mapping[str, Sequence[Demonstration]]) -> LearntReward:
+def _reward_for(path: Path, files: Mapping[str, Sequence[Demonstration]], person: str | None) -> LearntReward:
     """A reward, checked against the cells of all demonstrations."""
-    return read_reward_for(path, [one for own in files.values() for one in own])
+    return read_reward_for(path, [one for own in files.values() for one in own], person)
 
 
 def _list_metrics(how: Format, *, as_json: bool) -> None:

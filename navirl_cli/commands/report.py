@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 import click
 
-from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.rewards import check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
@@ -16,6 +16,7 @@ from navirl_cli.commands.shared import (
     finish,
     force_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
@@ -37,9 +38,18 @@ from navirl_cli.files import Input, replacing
 @demos_argument
 @click.argument("reward", type=FilePath)
 @choice_options(reward=True)
-@section("Learnt paths", samples_option(), seed_option)
+@section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
-def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples: int, seed: int, force: bool) -> None:
+def report(
+    demos: Path,
+    reward: Path,
+    choosing: Choosing,
+    person: str | None,
+    output: Path,
+    samples: int,
+    seed: int,
+    force: bool,
+) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
     The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
@@ -59,7 +69,9 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
 
     check_output(output, [demos, reward], force=force)
     everyone = demonstrations_in(demos)
-    learnt = read_reward_for(reward, everyone)
+    content = reward_content(reward, person)
+    learnt = learnt_of(content, str(reward))
+    check_cells(learnt, everyone, str(reward))
     demonstrations = choosing.of(everyone, [learnt])
     rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
@@ -83,10 +95,7 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
         logs = tuple(one["file"] for one in extracted["inputs"])
         changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
         made = Made(demos.name, reward.name, logs, changed, samples, seed)
-        content = report_of(
-            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, made
-        )
-        page = to_html(content)
+        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)

@@ -33,6 +33,19 @@ seed_option = click.option(
     "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
 demos_argument = click.argument("demos", type=FilePath)
+person_option = click.option(
+    "--person",
+    metavar="NAME",
+    shell_complete=completion.persons,
+    help="Take this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
+)
+#: The same beside positions of people, which --person names there.
+person_name_option = click.option(
+    "--person-name",
+    metavar="NAME",
+    shell_complete=completion.persons,
+    help="Drive by this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
+)
 logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=FilePath)
 topic_option = click.option(
     "--topic",

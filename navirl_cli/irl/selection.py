@@ -9,7 +9,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.reach import Reach, required_reach, steps_within_reach
 from navirl_cli.demos.subset import Subset
 from navirl_cli.demos.timing import steps_in_contact
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.irl.evidence import Evidence, evidence_of
 
 
@@ -70,6 +70,20 @@ def select(
     if only_corrected:
         chosen = _corrected(chosen)
     return with_steps(chosen, steps, reach_m)
+
+
+def of_participant(demonstrations: Sequence[Demonstration], person: str | None) -> Sequence[Demonstration]:
+    """The demonstrations of one participant; all of them for None.
+
+    Raises:
+        DemonstrationError: There are none of this participant.
+    """
+    if person is None:
+        return demonstrations
+    own = [one for one in demonstrations if one.participant == person]
+    if not own:
+        raise DemonstrationError(unknown("`person`", person, sorted({one.participant for one in demonstrations})))
+    return own
 
 
 def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None) -> Selection:

@@ -10,7 +10,15 @@ from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands import completion
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, scene_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.shared import (
+    demonstrations_in,
+    demos_argument,
+    person_option,
+    progress_bar,
+    samples_option,
+    say,
+    seed_option,
+)
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, Function, refuse_unused, section
 
@@ -43,12 +51,13 @@ def _group_option(count: str) -> Callable[[Function], Function]:
 @demos_argument
 @choice_options(reward=True)
 @section("Demonstrations", _group_option("repeatable; by default the groups that the reward was learnt from"))
-@section("Learnt paths", reward_option, samples_option(), seed_option)
+@section("Learnt paths", reward_option, person_option, samples_option(), seed_option)
 def ranks(
     page: Page,
     demos: Path,
     choosing: Choosing,
     reward: Path,
+    person: str | None,
     groups: tuple[str, ...],
     samples: int,
     seed: int,
@@ -65,7 +74,7 @@ def ranks(
     from navirl_cli.reports.ranks import rank_lines
 
     everyone = demonstrations_in(demos)
-    learnt = read_reward_for(reward, everyone)
+    learnt = read_reward_for(reward, everyone, person)
     trained = learnt.trained(everyone)
     demonstrations = choosing.subset.of(everyone)
     chosen, others = demonstrations, dict[str, int]()

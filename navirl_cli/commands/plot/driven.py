@@ -12,6 +12,7 @@ from navirl_cli.commands.shared import (
     demonstrations_in,
     demos_argument,
     finish,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
@@ -72,12 +73,20 @@ def paths(page: Page, demos: Path, choosing: Choosing, crop: bool, together: boo
         type=FilePath,
         help="Learnt reward; adds its paths, for the groups from which it was learnt.",
     ),
+    person_option,
     samples_option(100),
     seed_option,
 )
 @section("Look", click.option("--bars", "as_bars", is_flag=True, help="Bars from 0, as in Fig. 7 of the paper."))
 def properties(
-    page: Page, demos: Path, choosing: Choosing, reward: Path | None, samples: int, seed: int, as_bars: bool
+    page: Page,
+    demos: Path,
+    choosing: Choosing,
+    reward: Path | None,
+    person: str | None,
+    samples: int,
+    seed: int,
+    as_bars: bool,
 ) -> None:
     """Draw length, distance and area of paths by group.
 
@@ -87,9 +96,9 @@ def properties(
     from navirl_cli.evaluation.metrics import PAPER_METRICS
     from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 
-    refuse_unused("--reward", "samples", "seed", "everything", used=reward is not None)
+    refuse_unused("--reward", "person", "samples", "seed", "everything", used=reward is not None)
     everyone = demonstrations_in(demos)
-    learnt = None if reward is None else read_reward_for(reward, everyone)
+    learnt = None if reward is None else read_reward_for(reward, everyone, person)
     demonstrations = choosing.of(everyone, [] if learnt is None else [learnt])
     result = _compared(demonstrations, learnt, samples, seed)
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}

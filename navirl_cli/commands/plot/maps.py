@@ -11,7 +11,7 @@ import click
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, scene_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, say, seed_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, person_option, say, seed_option
 from navirl_cli.commands.types import Choice, Count
 from navirl_cli.commands.usage import Command, Example, Function, refuse_unused, section
 
@@ -97,16 +97,25 @@ def scene_options(function: Function) -> Function:
     """Options of figures of one scene, as arguments ``page`` and ``sight``."""
 
     @wraps(function)
-    def packed(page: Page, demos: Path, reward: Path, choosing: Choosing, trial: str | None, **others: Any) -> Any:
+    def packed(
+        page: Page,
+        demos: Path,
+        reward: Path,
+        choosing: Choosing,
+        person: str | None,
+        trial: str | None,
+        **others: Any,
+    ) -> Any:
         refuse_unused("--overlay samples", "samples", "seed", used=SAMPLES in others["overlay"])
         everyone = demonstrations_in(demos)
-        learnt = read_reward_for(reward, everyone)
+        learnt = read_reward_for(reward, everyone, person)
         one, demonstrations = scene_of(choosing, everyone, [learnt], trial)
         return function(page, Sight(demonstrations, one, learnt.reward, **others))
 
     scene = section(
         "Scene",
         reward_option,
+        person_option,
         trial_option,
         crop_option,
         click.option(
