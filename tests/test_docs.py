@@ -26,6 +26,7 @@ SLOW = {
     "other-rewards.md",
     "published-study.md",
     "several-rewards.md",
+    "visit.md",
 }
 
 

@@ -11,9 +11,10 @@ import pytest
 import verdicts
 from fuzzing import Tally, judge_logs, logs, truth
 from mutations import MUTATIONS, Mutant, mutant
+from rewriting import Part, taken_apart
 from strict_log import FaultError
 from structured import STRUCTURED
-from verdicts import ForbiddenError, check_hits, judge
+from verdicts import WANTS, ForbiddenError, check_hits, judge
 
 from navirl_cli.errors import LogError
 from navirl_cli.logs.container.compressed import open_log
@@ -95,6 +96,12 @@ def test_only_unprotected_messages_that_were_hit_may_differ_in_a_faulty_file():
     protected = replace(intact, log=replace(intact.log, protected=True))
     check_hits(intact, intact.rows, hit, fault)
     check_hits(intact, rows, hit, fault)
+    # a structure without that message: it may be missing, the others may not
+    others = b"".join(one.record for one in intact.log.strict.messages if one is not message)
+    check_hits(protected, fewer, b"", fault, others)
+    check_hits(protected, fewer, b"", fault, others, hit=True)
+    with pytest.raises(ForbiddenError, match="1 messages of /odom are lost or changed; a fault"):
+        check_hits(protected, fewer, b"", fault, others + message.record, hit=True)
     for truth_, found, data in ((intact, rows, intact.log.data), (intact, fewer, hit), (protected, rows, hit)):
         with pytest.raises(ForbiddenError, match="1 messages of /odom are lost or changed; a fault"):
             check_hits(truth_, found, data, fault)
@@ -180,3 +187,14 @@ def test_an_error_of_several_lines_is_found(tmp_path, monkeypatch):
     monkeypatch.setattr(verdicts, "scan", refuse)
     with pytest.raises(ForbiddenError, match="scan: an error message that is not one line: "):
         judge(*intact, tmp_path / "intact.mcap")
+
+
+def test_a_summary_that_defines_a_channel_otherwise_than_the_data_is_reported(tmp_path):
+    """Its CRC is right, so that no byte is damaged: one of the two is wrong all the same."""
+    parts = taken_apart(next(log for log in logs() if log.name == "zstd").data)
+    parts.summary[:] = [Part(one.code, one.content.replace(b"/odom", b"/idom")) for one in parts.summary]
+    path = tmp_path / "run.mcap"
+    path.write_bytes(parts.stored())
+    (damage, *_) = read(path, WANTS).damage
+    assert "is defined twice, as" in damage.reason
+    assert "'/idom'" in damage.reason

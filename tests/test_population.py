@@ -5,6 +5,7 @@ from dataclasses import replace
 import factories as make
 import numpy as np
 import pytest
+from executors import Here
 
 from navirl_cli.errors import ArgumentError, DemonstrationError
 from navirl_cli.irl.analyses import Pool, Questions
@@ -20,12 +21,6 @@ from navirl_cli.irl.status import Status
 
 TRUTH = np.array([-40.0, -2.0, -5.0, 2.0])
 SCATTER = 0.25
-
-
-class Here:
-    """An executor of this thread."""
-
-    map = staticmethod(map)
 
 
 def people(count, each=2, seed=1):

@@ -17,7 +17,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from navirl_cli.arrays import BoolArray, FloatArray
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, inside, legend_below, window_around
 from navirl_cli.figures.marks import Marks, Places, draw_marks, draw_nominal
 from navirl_cli.figures.overlay import Overlay, draw_overlays, overlay_handles

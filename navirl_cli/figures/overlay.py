@@ -11,8 +11,9 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import LEARNT, PERSON_RADIUS_M
+from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.groups import by_group
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.style import colour_of, look
 
 #: Width of a path and of the light border around it, points; and of more paths than so many, with their opacity.
