@@ -54,7 +54,7 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
-    from navirl_cli.reports.made import Made, changed_settings
+    from navirl_cli.reports.made import Made, changed_settings, subset_words
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
@@ -82,7 +82,9 @@ def report(demos: Path, reward: Path, choosing: Choosing, output: Path, samples:
         made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
         logs = tuple(one["file"] for one in extracted["inputs"])
         changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
-        made = Made(demos.name, reward.name, logs, changed, samples, seed)
+        asked = [*subset_words(choosing.subset), *(["--all"] if choosing.everything else [])]
+        asked += ["--samples", str(samples), "--seed", str(seed)]
+        made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
         content = report_of(
             demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, made
         )
