@@ -231,7 +231,7 @@ def test_no_figure_leaves_half_of_a_sheet_empty(page):
     page.call("Emulation.setEmulatedMedia", media="print")
     heights = page.run("[...document.querySelectorAll('figure img')].map(one => one.getBoundingClientRect().height)")
     page.call("Emulation.setEmulatedMedia", media="")
-    assert max(heights) <= 85 / 25.4 * 96 + 1  # mm
+    assert max(heights) <= 105 / 25.4 * 96 + 1  # mm
 
 
 def test_it_prints_on_a4(page):

@@ -276,7 +276,7 @@ def test_fonts_are_those_of_the_styles():
 
 def test_the_example_in_front_is_made_by_the_command_that_it_shows():
     command = next(line for line in (ROOT / "README.md").read_text().splitlines() if "navirl plot policy" in line)
-    assert "--crop --overlay demos --wide" in command
+    assert "--crop --overlay all --wide" in command
     demo = (ROOT / "sample_logs" / "demo.sh").read_text().replace("demo/policy", "policy")
     assert command.split("--trial")[1] in demo
     with Image.open(ROOT / "docs" / "policy.png") as image:

@@ -3,7 +3,7 @@
 import json
 import re
 from base64 import b64decode
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import inf
 from pathlib import Path
 
@@ -93,7 +93,7 @@ def test_it_says_how_it_was_made(page):
     for command in (
         "navirl extract p01.mcap -o demos.json",
         "navirl fit demos.json --cycle 2 -o reward.json",
-        "navirl report demos.json reward.json --samples 100 --seed 0 -o report.html",
+        "navirl report demos.json reward.json --all --samples 100 --seed 0 -o report.html",
     ):
         assert f"<code>{command}</code>" in made
 
@@ -109,7 +109,9 @@ def test_demonstrations_are_chosen_by_the_options_that_give_the_same():
     assert selection_words(everyone, [force, again]) == ["--condition", "force"]
     assert selection_words(everyone, [again]) == ["--condition", "force", "--cycle", "2"]
     assert selection_words(everyone, [again, joystick]) == ["--cycle", "2"]
-    assert selection_words(everyone, [force, joystick]) is None
+    assert selection_words(everyone, [force, joystick]) == ["--trial", force.id, "--trial", joystick.id]
+    course = replace(again, id="p01/9", set="obstacle course")
+    assert selection_words([*everyone, course], [again])[-2:] == ["--set", "main task"]
 
 
 def test_settings_other_than_the_defaults_are_named():

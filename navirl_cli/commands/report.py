@@ -64,7 +64,7 @@ def report(
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
-    from navirl_cli.reports.made import Made, changed_settings
+    from navirl_cli.reports.made import Made, changed_settings, subset_words
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
@@ -94,7 +94,10 @@ def report(
         made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
         logs = tuple(one["file"] for one in extracted["inputs"])
         changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
-        made = Made(demos.name, reward.name, logs, changed, samples, seed)
+        asked = [*subset_words(choosing.subset), *(["--all"] if choosing.everything else [])]
+        asked += ["--person", person] if person is not None else []
+        asked += ["--samples", str(samples), "--seed", str(seed)]
+        made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
         page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")

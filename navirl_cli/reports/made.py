@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.subset import Subset
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph
 
 #: Defaults of a fit, as its file names them.
@@ -24,19 +25,21 @@ class Made:
     #: Names of the logs, and the settings of extraction that are no defaults, by name.
     logs: tuple[str, ...]
     settings: Mapping[str, Any]
-    samples: int
+    #: Options of the report.
+    options: tuple[str, ...]
     seed: int
+    #: All demonstrations of the file.
+    everyone: Sequence[Demonstration]
 
 
-def made_blocks(demonstrations: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[Block]:
+def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
     """The section of a report on how everything was made.
 
     Args:
-        demonstrations: All of the file.
         content: Of the reward file.
         made: The files.
     """
-    used = content["demonstrations"]
+    used, demonstrations = content["demonstrations"], made.everyone
     taught = [one for one in demonstrations if one.id in set(used)]
     start = ", ".join(f"{name} {value:g}" for name, value in content["initial"].items())
     how = f"Steps: {content['learnt_from']} ({content['steps']}); method {content['method']}"
@@ -47,7 +50,7 @@ def made_blocks(demonstrations: Sequence[Demonstration], content: Mapping[str, A
     if made.settings:
         changed = ", ".join(f"{name} {value}" for name, value in made.settings.items())
         lines.append(f"Settings of the extraction other than the defaults: {changed}")
-    commands = _commands(demonstrations, taught, content, made)
+    commands = _commands(taught, content, made)
     return [
         Heading("How it was made"),
         Bullets(tuple(f"{line}." for line in lines)),
@@ -72,39 +75,40 @@ def changed_settings(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -
 _USUAL = {"time": "header", "force_scale": 1.0, "wrench": True}
 
 
-def _commands(
-    demonstrations: Sequence[Demonstration],
-    taught: Sequence[Demonstration],
-    content: Mapping[str, Any],
-    made: Made,
-) -> list[str]:
-    """Command lines; that of the fit only where its demonstrations are all of some conditions and of one cycle."""
+def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
+    """Command lines; none for a fit with a prior, whose file is not known."""
     extract = shlex.join(["navirl", "extract", *made.logs, "-o", made.demos])
-    report = ["navirl", "report", made.demos, made.reward, "--samples", str(made.samples), "--seed", str(made.seed)]
-    words = selection_words(demonstrations, taught)
-    if words is None or content["prior"]:
-        return [extract, shlex.join([*report, "-o", "report.html"])]
+    report = shlex.join(["navirl", "report", made.demos, made.reward, *made.options, "-o", "report.html"])
+    if content["prior"] or not taught:
+        return [extract, report]
     changed = [
         word
         for name, option in _OPTIONS.items()
         if content.get(name, _FIT[name]) != _FIT[name]
         for word in (option, ",".join(content[name]) if name == "terms" else f"{content[name]}")
     ]
-    fit = shlex.join(["navirl", "fit", made.demos, *words, *changed, "-o", made.reward])
-    return [extract, fit, shlex.join([*report, "-o", "report.html"])]
+    chosen = selection_words(made.everyone, taught)
+    return [extract, shlex.join(["navirl", "fit", made.demos, *chosen, *changed, "-o", made.reward]), report]
 
 
-def selection_words(demonstrations: Sequence[Demonstration], taught: Sequence[Demonstration]) -> list[str] | None:
-    """Options that choose exactly some of the demonstrations by condition and cycle; None where there are none."""
-    conditions = list(dict.fromkeys(one.condition for one in taught))
-    for cycles in ([], list(dict.fromkeys(one.cycle for one in taught))):
-        for chosen in ([], conditions):
-            fitting = [
-                one
-                for one in demonstrations
-                if not one.truncated and (not chosen or one.condition in chosen) and (not cycles or one.cycle in cycles)
-            ]
-            if [one.id for one in fitting] == [one.id for one in taught] and len(cycles) < 2 and None not in cycles:
-                named = [word for one in chosen for word in ("--condition", one.value)]
-                return [*named, *(["--cycle", str(cycles[0])] if cycles else [])]
-    return None
+def selection_words(everyone: Sequence[Demonstration], taught: Sequence[Demonstration]) -> list[str]:
+    """The shortest options that choose exactly some demonstrations: by condition, cycle and set, or one by one."""
+    whole = [one for one in everyone if not one.truncated or one in taught]
+    conditions = tuple(dict.fromkeys(one.condition.value for one in taught))
+    cycles = tuple(dict.fromkeys(one.cycle for one in taught if one.cycle is not None))
+    sets = tuple(dict.fromkeys(one.set or "main task" for one in taught))
+    for chosen in (
+        Subset(),
+        Subset(condition=conditions),
+        Subset(cycle=cycles),
+        Subset(condition=conditions, cycle=cycles),
+        Subset(condition=conditions, cycle=cycles, set=sets),
+    ):
+        if [one.id for one in chosen.of(whole)] == [one.id for one in taught]:
+            return subset_words(chosen)
+    return subset_words(Subset(trial=tuple(one.id for one in taught)))
+
+
+def subset_words(subset: Subset) -> list[str]:
+    """A choice of demonstrations as options of a command."""
+    return [word for field, names in vars(subset).items() for name in names for word in (f"--{field}", str(name))]

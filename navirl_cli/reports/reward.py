@@ -80,7 +80,7 @@ def report_of(
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
         *_recommendation(demonstrations, learnt, seed),
-        *_warnings(demonstrations, learnt, content, ranked),
+        *_warnings(made.everyone, learnt, content, ranked),
         Heading("Parameters"),
         formula(learnt.reward.terms),
         parameter_table(content),
@@ -106,7 +106,7 @@ def report_of(
         Heading("Trials"),
         trial_table(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
-        *made_blocks(demonstrations, content, made),
+        *made_blocks(content, made),
         Heading("Sources"),
         Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
