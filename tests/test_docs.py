@@ -25,6 +25,7 @@ SLOW = {
     "nav2-study.md",
     "other-rewards.md",
     "published-study.md",
+    "settings.md",
     "several-rewards.md",
     "visit.md",
 }
