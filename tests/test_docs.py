@@ -27,6 +27,7 @@ SLOW = {
     "plan.md",
     "persons.md",
     "published-study.md",
+    "settings.md",
     "several-rewards.md",
     "visit.md",
 }

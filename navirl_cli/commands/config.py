@@ -11,6 +11,7 @@ from navirl_cli.commands.shared import echo, echo_json, json_option
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.tables import Column, Table, written
+from navirl_cli.errors import ArtefactError
 
 #: Of where a value is from.
 _DEFAULT, _UNSET = "default", "not set"
@@ -33,6 +34,8 @@ def config(data: Path | None, as_json: bool) -> None:
     topic = ["wrench=/ft"], for every command that has the option. A table as [extract] or [plot.paths] holds any
     options of this command.
     """
+    if data is not None and not data.exists():
+        raise ArtefactError(f"{data}: expected a folder or a file, found none")
     experiment = experiment_for([] if data is None else [data])
     rows = list(_rows(experiment))
     if as_json:
