@@ -36,6 +36,7 @@ COMMANDS = {
     "report": "Write one self-contained HTML page on demonstrations and the reward learnt from them.",
     "study": "Evaluate a study as the paper does: fits by participant and pooled, figures, claims, report.",
     "import-study": "Turn the published user study (RUNS) into logs.",
+    "config": "Show which values options have beside some data, and from where.",
     "simulate": "Simulate people who push a robot, and write logs with known truth.",
 }
 

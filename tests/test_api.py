@@ -172,6 +172,19 @@ class TestResults:
         found.write("metrics.csv")
         assert Path("metrics.csv").read_text().startswith("group,path_type,n,length_m")
 
+    def test_demonstrations_are_chosen_as_on_the_command_line(self, demos, reward):
+        some = demos.select(cycle=2, participant=["p01", "p02"])
+        assert [one.id for one in some] == ["p01/3", "p01/4", "p02/3", "p02/4"]
+        assert some.sources() == demos.sources()
+        with pytest.raises(navirl.NavirlError, match=r"`cycle`: expected one of 'cycle 1', .* found 'cycle 9'"):
+            demos.select(cycle=9)
+        found = navirl.evaluate(demos, reward, metrics="length_m", samples=5)
+        assert {one["id"] for one in found.document["demonstrations"]} == set(reward.demonstrations)
+        assert "those that the reward was learnt from; `all` takes the others too" in repr(found)
+        days = navirl.evaluate({"one": some, "other": demos}, metrics="length_m", quantiles=0.5, cycle=2)
+        assert days.document["pairs"][0]["minus"] == "one: force, cycle 2"
+        assert {one["share"] for one in days.document["quantiles"]} == {0.5}
+
     def test_a_policy_lies_on_its_grid(self, demos, reward):
         where = navirl.policy(reward, demos[0])
         free = np.isfinite(where.visits)

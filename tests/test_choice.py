@@ -1,6 +1,7 @@
 """Which demonstrations a command is about: chosen by the user, by a reward, or all."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import factories as make
 import numpy as np
@@ -137,6 +138,9 @@ def test_the_scene_is_one_that_the_reward_was_learnt_from(navirl, tmp_path):
     )
     for choice in (("--all",), ("--trial", "p1/1"), ("--cycle", "1")):
         assert "scene of" not in navirl(*words, *choice).stderr
+    Path("navirl.toml").write_text("robot-radius = 0.4")
+    assert "--robot-radius is that of the scene" in navirl(*words, "--all").stderr
+    Path("navirl.toml").unlink()
     assert "--cycle goes with --scene DEMOS." in navirl("plan", "r.json", "--cycle", "2", code=2).stderr
     message = navirl(*words, "--cycle", "4", code=1).stderr
     assert "--cycle: expected one of 'cycle 1', 'cycle 2', found 'cycle 4'" in message

@@ -34,7 +34,7 @@ def properties(bars, width_in=PAGE_IN, *, as_bars=False):
 
 
 def ends(lines):
-    return [tuple(segment[:, 0]) for segment in lines.get_segments()]
+    return [tuple(np.reshape(segment, (-1, 2))[:, 0]) for segment in lines.get_segments()]
 
 
 def test_points_are_means_with_intervals_and_standard_deviations():

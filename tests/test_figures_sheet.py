@@ -180,6 +180,7 @@ TAKEN = {
     "navirl_cli.irl.terms.term": {"Parameter"},
     "navirl_cli.evaluation.compare": {"DRIVEN", "LEARNT", "ON_GRID", "PERSON_RADIUS_M"},
     "navirl_cli.evaluation.groups": {"GroupMetrics", "by_group", "group_of"},
+    "navirl_cli.evaluation.motion": {"PERSON_RADIUS_M"},
     "navirl_cli.evaluation.metrics": {"PAPER_METRICS", "Metric", "Values"},
     "navirl_cli.evaluation.ranks": {"GroupRanks"},
     "navirl_cli.study.pipeline": {"Study"},

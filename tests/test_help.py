@@ -24,6 +24,8 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
 }
 SLOW = {
+    "report demos.json reward.json --samples 50 -o report.html --force",
+    "simulate -o simulated",
     "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",
@@ -123,6 +125,8 @@ TABLES = {
     "fit": ["demos.json", "--cycle", "2", "--intervals", "wald", "-o", "new.json"],
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
+    "info": ["demos.json"],
+    "config": [],
     "plan": ["reward.json", "--scene", "demos.json"],
     "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
@@ -152,6 +156,7 @@ def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch
 
 #: Objects whose keys are names of the data: participants, groups, modalities, metrics, reasons.
 BY_DATA = {
+    "groups",
     "parameters",
     "reward_by_term",
     "participants",

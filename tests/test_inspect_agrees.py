@@ -121,4 +121,4 @@ def test_a_check_holds_statistics_and_indexes_against_all_messages(tmp_path, top
     place = data.rindex(listed)
     data[place : place + 8] = (message.log_time_ns + 10**9).to_bytes(8, "little")
     path.write_bytes(data)
-    assert any(f"other times of receipt of {topic}" in one.reason for one in check(path))
+    assert any("other times" in one.reason and topic in one.reason for one in check(path))

@@ -10,6 +10,7 @@ import factories as make
 import numpy as np
 import pytest
 import study_data
+from executors import Here
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
@@ -28,13 +29,6 @@ from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
 LENGTH, SPACE = (tuple(TERMS[name] for name in names) for names in (("length",), ("length", "personal-space")))
-
-
-class Here:
-    """An executor that runs everything where it stands."""
-
-    def map(self, function, items):
-        return map(function, items)
 
 
 @pytest.fixture(scope="module")

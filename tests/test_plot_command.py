@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from figure_factory import demonstration
+from figure_factory import demonstration, one_axes, scene
 from PIL import Image
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
@@ -18,10 +18,13 @@ from navirl_cli.commands.plot import FIGURES, plot
 from navirl_cli.commands.plot.page import FONTS, FORMATS, STYLES
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures import sheet, style
+from navirl_cli.figures.cells import draw_policy
 from navirl_cli.figures.style import LOOKS
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
+
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -269,3 +272,22 @@ def test_more_than_forty_paths_have_a_map_for_each_group(figure_of):
 
 def test_fonts_are_those_of_the_styles():
     assert list(FONTS) == list(style.FONTS)
+
+
+def test_the_example_in_front_is_made_by_the_command_that_it_shows():
+    command = next(line for line in (ROOT / "README.md").read_text().splitlines() if "navirl plot policy" in line)
+    assert "--crop --overlay all --wide" in command
+    demo = (ROOT / "sample_logs" / "demo.sh").read_text().replace("demo/policy", "policy")
+    assert command.split("--trial")[1] in demo
+    with Image.open(ROOT / "docs" / "policy.png") as image:
+        assert image.size[0] == 2148, "a page wide, at 300 dpi"
+        colours = {image.convert("RGB").getpixel((x, image.size[1] // 2)) for x in range(0, 2148, 4)}
+    assert len(colours) > 20
+
+
+def test_people_are_filled_where_that_hides_no_visits():
+    a_scene = scene()
+    near = np.hypot(*(a_scene.lattice.xy_m - a_scene.people_m[0]).T) < 0.25
+    for visits, filled in ((np.where(near, 0.0, 0.01), True), (np.full(a_scene.lattice.size, 0.01), False)):
+        marks = draw_policy(one_axes(), a_scene, visits).marks
+        assert marks.discs is filled

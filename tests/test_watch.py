@@ -2,29 +2,45 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import factories as make
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from navirl_cli.artefacts.plans import read_plan
+from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.artefacts.plans import read_line, read_plan
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
 from navirl_cli.demos.extract import ExtractSettings
-from navirl_cli.errors import ArtefactError, LogError
+from navirl_cli.demos.subset import Subset
+from navirl_cli.errors import ArtefactError, DemonstrationError, LogError
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.fit import fit
+from navirl_cli.irl.likelihood import policy_of
+from navirl_cli.irl.log_scale import LogScale
+from navirl_cli.irl.newcomer import Others
+from navirl_cli.irl.paths import sample_paths
 from navirl_cli.irl.prior import Prior
+from navirl_cli.irl.random_effects import Spread
+from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import select
 from navirl_cli.logs.container.records import FOOTER, MAGIC
 from navirl_cli.logs.load import LoadOptions
 from navirl_cli.planning import certainty
 from navirl_cli.planning.certainty import Certainty, another_pass
-from navirl_cli.planning.recommendation import Quantity
+from navirl_cli.planning.recommendation import Quantity, straight_passage
 from navirl_cli.reports.watch import learnt_line
+from navirl_cli.simulation.log import write_log
 from navirl_cli.watching import loop
 from navirl_cli.watching.folder import PAUSE_S, SHARE, Folder, pause_s
-from navirl_cli.watching.learning import next_trials
+from navirl_cli.watching.learning import Choice, learn, next_trials
 from navirl_cli.watching.visit import Visit
 
 SAMPLES = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
@@ -148,7 +164,7 @@ class TestVisit:
         assert [one.id for one in again.demonstrations()] == [one.id for one in visit.demonstrations()]
         other = Visit(tmp_path, ExtractSettings(participant="x"), LoadOptions())
         other.open()
-        assert taken(other, logs / "a.mcap").changed
+        assert "a.mcap: counted anew, because options" in taken(other, logs / "a.mcap").notes[0]
         assert {one.participant for one in other.demonstrations()} == {"x"}
 
     def test_a_repaired_copy_counts_once_and_a_longer_recording_replaces_what_it_was(self, visit, logs):
@@ -163,7 +179,7 @@ class TestVisit:
         assert "holds trials that a.mcap holds too" in line
         (logs / "a.mcap").write_bytes(data)
         added = taken(visit, logs / "a.mcap")
-        assert "has changed since it was counted" in added.notes[0]
+        assert "a.mcap: counted anew, because it has changed" in added.notes
         assert (visit.recordings, len(visit.demonstrations())) == (1, 7)
         assert few < 7
 
@@ -182,7 +198,7 @@ class TestVisit:
         for number, log in enumerate(SAMPLES[:2]):
             shutil.copy(log, logs / f"{number}.mcap")
             taken(visit, logs / f"{number}.mcap")
-        chosen = select(visit.demonstrations(), conditions=["force"]).demonstrations
+        chosen = select(visit.demonstrations(), Subset(("force",))).demonstrations
         # two starts beside the line, and two from the line, of which the later one counts
         assert [one.id for one in next_trials(chosen)] == ["p02/1", "p02/2", "p02/4"]
 
@@ -213,6 +229,28 @@ def test_another_pass_changes_a_normal_estimate_as_drawn_data_do(prior):
     assert another_pass(a_fit(30, prior)[0], slope) < found / 3
 
 
+@pytest.mark.slow
+def test_another_pass_changes_a_fit_as_much_as_predicted():
+    """People drawn from the prior, four paths of each, then a fifth: 0.020 m predicted, 0.017 m found."""
+    scene = straight_passage(0.3, 0.1).scene
+    mean, scatter = np.array([-54.0, -0.9, -4.9, 1.7]), np.array([0.1, 0.25, 0.25, 0.2])
+    prior, rng = Prior.gaussian(mean, np.diag((mean * scatter) ** 2)), np.random.default_rng(0)
+    ratios = []
+    for _ in range(12):
+        person = Reward(tuple((mean * np.exp(rng.normal(0, scatter))).tolist()))
+        drawn = sample_paths(policy_of(person, scene), scene.start, 5, rng)
+        cells = [scene.lattice.cells[drawn.path(number)] for number in range(5)]
+        paths = [
+            make.demonstration(scene.lattice.grid, one, scene.people_m, number) for number, one in enumerate(cells, 1)
+        ]
+        four, five = (
+            fit(evidence_of(some), Reward(tuple(mean.tolist())), prior=prior, scan=False) for some in (paths[:4], paths)
+        )
+        sure = certainty.certainty(four, 0.3, 0.1)
+        ratios.append((certainty.passing_m(five.reward, 0.3, 0.1) - sure.passing_m.value) / sure.another_m)
+    assert 0.6 < np.sqrt(np.mean(np.square(ratios))) < 1.5
+
+
 def test_the_line_says_what_is_learnt_and_whether_to_go_on():
     sure = Certainty(Quantity(0.43, 0.31, 0.52), 0.061)
     assert learnt_line(sure, 0.5, 4, 1) == (
@@ -228,7 +266,7 @@ def test_the_line_says_what_is_learnt_and_whether_to_go_on():
 @pytest.fixture
 def quick(monkeypatch):
     """Without the search for other maxima and with few draws."""
-    monkeypatch.setattr(loop, "confirmed", lambda learnt, _choice: (learnt, False))
+    monkeypatch.setattr(loop, "confirmed", lambda learnt, _choice: (learnt, ""))
     monkeypatch.setattr(certainty, "DRAWS", 6)
 
 
@@ -241,12 +279,18 @@ def watch(folder, *words, code=0):
     return done
 
 
+def interrupted(*_):
+    raise KeyboardInterrupt
+
+
 @pytest.mark.usefixtures("quick")
 def test_from_a_recording_to_reward_paths_and_figure_and_on_from_there(tmp_path):
     (tmp_path / "logs").mkdir()
-    watch(tmp_path)
-    assert not (tmp_path / "visit" / "reward.json").exists()
     shutil.copy(SAMPLES[0], tmp_path / "logs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "write_reward", interrupted)
+        assert watch(tmp_path, code=130).stderr == "navirl: interrupted\n"
+    assert not (tmp_path / "visit" / "reward.json").exists()
     (line,) = watch(tmp_path).stdout.splitlines()
     assert line.startswith("4 demonstrations of 1 recording: pass people at 0.")
     visit = tmp_path / "visit"
@@ -270,3 +314,102 @@ def test_the_earlier_reward_is_no_output(tmp_path):
     (tmp_path / "visit").mkdir()
     (tmp_path / "visit" / "reward.json").write_text("{}")
     assert "expected another file than the input" in watch(tmp_path, "--reward", "visit/reward.json", code=2).stderr
+
+
+def waited(condition, what, seconds=120):
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.02)
+
+
+def hash_of(visit):
+    reward = visit / "reward.json"
+    return reward.read_bytes() if reward.exists() else b""
+
+
+@pytest.mark.slow
+def test_a_visit_of_two_cycles_that_is_killed_in_the_middle(tmp_path):
+    """The second cycle drives the path that the first one taught; nothing is lost, and nothing counts twice."""
+    visit, logs = tmp_path / "visit", tmp_path / "logs"
+    logs.mkdir()
+    words = [sys.executable, "-m", "navirl_cli", "watch", "logs", "--condition", "force", "-o", "visit"]
+
+    def start():
+        return subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    first = start()
+    write_log(1, 3, logs / "first.mcap", force=False)
+    waited(lambda: any((visit / "recordings").glob("*.json")), "no recording counts")
+    first.kill()
+    first.communicate()
+    second = start()
+    waited(lambda: read_intervals(visit), "the first cycle is not learnt")
+    learnt = hash_of(visit)
+    write_log(1, 3, logs / "second.mcap", driven_m=read_line(visit / "path_3.csv"), force=False)
+    waited(lambda: hash_of(visit) != learnt and read_intervals(visit), "the second cycle is not learnt")
+    second.send_signal(signal.SIGINT)
+    stdout, stderr = second.communicate(timeout=60)
+    assert second.returncode == 130
+    assert stderr.endswith("navirl: interrupted\n")
+    one, two = stdout.splitlines()
+    assert one.startswith("4 demonstrations of 1 recording: ")
+    assert two.startswith("6 demonstrations of 2 recordings: ")
+    assert sorted(path.name for path in visit.iterdir() if path.name.startswith(".")) == []
+    # as without a kill, and as by hand
+    watch(tmp_path, "-o", "other")
+    CliRunner().invoke(
+        cli, ["fit", str(visit / "demos.json"), "--condition", "force", "-o", str(tmp_path / "hand.json")]
+    )
+    own, other, hand = (
+        read_reward(path).reward.theta
+        for path in (visit / "reward.json", tmp_path / "other" / "reward.json", tmp_path / "hand.json")
+    )
+    assert own == other == hand
+    # the second cycle drove where it was planned, so that the person had less to correct
+    impulses = {
+        one.id: sum(np.hypot(*contact.impulse_n_s) for contact in one.contacts)
+        for one in read_demonstrations(visit / "demos.json")
+    }
+    assert max(impulses["p01/8"], impulses["p01/9"]) < min(impulses["p01/1"], impulses["p01/2"])
+
+
+def read_intervals(visit):
+    """The intervals of a visit's reward, which the confirmed fit has."""
+    reward = visit / "reward.json"
+    return read_reward(reward).intervals if reward.exists() else ()
+
+
+def test_earlier_people_are_a_prior_with_their_scatter_and_teach_one_person_at_a_time():
+    typical = Reward((-50.0, -1.0, -5.0, 2.0))
+    others = Others(
+        LogScale(typical, np.array([True, True, True, False])),
+        Spread(np.log([50.0, 1.0, 5.0]), np.array([0.1, 0.2, 0.3])),
+    )
+    choice = Choice(earlier=SimpleNamespace(others=others, reward=typical))
+    np.testing.assert_allclose(np.diag(choice.prior.precision), [1 / 25, 25, 1 / 2.25, 0.0])
+    np.testing.assert_allclose(choice.prior.gradient(np.array(typical.theta)), 0.0, atol=1e-9)
+    two = [
+        make.demonstration(make.open_grid(8, 4), [(x, 1) for x in range(1, 6)], participant=name) for name in ("a", "b")
+    ]
+    with pytest.raises(DemonstrationError, match=r"expected recordings of one participant, found a, b"):
+        learn(two, choice)
+
+
+@pytest.mark.slow
+def test_the_next_person_is_learnt_from_how_earlier_people_differ(tmp_path):
+    (tmp_path / "logs").mkdir()
+    shutil.copy(SAMPLES[0], tmp_path / "logs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        for words in (
+            ["extract", *map(str, SAMPLES[1:]), "-o", "demos.json"],
+            ["fit", "demos.json", "--condition", "force", "--pool", "persons", "-o", "persons.json"],
+        ):
+            done = CliRunner().invoke(cli, words, catch_exceptions=False)
+            assert done.exit_code == 0, done.output
+    said = watch(tmp_path, "--reward", "persons.json").stdout.splitlines()
+    assert said[0].startswith("4 demonstrations of 1 recording: pass people at 0.")
+    assert all(line.startswith("refined by the mean over all rewards that the person may have: ") for line in said[1:])
+    assert read_reward(tmp_path / "visit" / "reward.json").intervals

@@ -52,13 +52,10 @@ from navirl_cli.demos.recordings import Recordings, extract_recordings
 from navirl_cli.demos.subset import FIELDS
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
-from navirl_cli.evaluation.choice import choose
-from navirl_cli.evaluation.compare import LEARNT, compare
+from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.evaluation.groups import groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, chosen_to_rank, ranking
+from navirl_cli.evaluation.questions import answers_to, asked_of
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Pool, Questions, answers
@@ -82,6 +79,7 @@ from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
+from navirl_cli.reports.per_trial import write_per_trial
 
 
 def extract(
@@ -402,7 +400,7 @@ def fit(
 
 
 def evaluate(
-    demos: PathLike | Sequence[Demonstration],
+    demos: PathLike | Sequence[Demonstration] | Mapping[str, PathLike | Sequence[Demonstration]],
     reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
     *,
     person: str | None = None,
@@ -416,6 +414,8 @@ def evaluate(
     by: str | Collection[str] = (),
     pair: tuple[str, str] | Sequence[tuple[str, str]] = (),
     ranks: bool = False,
+    quantiles: float | Sequence[float] = (),
+    per_trial: PathLike | None = None,
     samples: int = 1000,
     precision: float | None = None,
     seed: int = 0,
@@ -423,7 +423,7 @@ def evaluate(
     """Measure demonstrated, learnt and baseline paths, as ``navirl evaluate``.
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their file; or several by name, whose groups of the same name are compared.
         reward: A reward, its file, values by name of parameter; or several rewards by name.
         person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         metrics: Names of metrics, or "all"; the paper's three by default.
@@ -438,6 +438,8 @@ def evaluate(
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
         ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
             group, for the groups that the reward was learnt from.
+        quantiles: Shares of which quantiles by group are computed: 0.5 for medians.
+        per_trial: Long table to write, one row for each trial, type of path and metric: .csv or .parquet.
         samples: Number of paths sampled from each policy in each scene.
         precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
             deviation.
@@ -452,37 +454,32 @@ def evaluate(
     Example:
         >>> navirl.evaluate(demos, reward).to_frame()[["group", "path_type", "length_m_mean"]]
     """
-    everyone = demonstrations_in(demos)
+    given = {str(n): one for n, one in demos.items()} if isinstance(demos, Mapping) else {"demos": demos}
+    files = {name: demonstrations_in(one) for name, one in given.items()}
+    everyone = [one for own in files.values() for one in own]
     rewards = _rewards(reward, everyone, person)
-    if ranks and len(rewards) != 1:
-        raise ArgumentError("`ranks` needs one `reward`")
+    if ranks and not len(rewards) == len(files) == 1:
+        raise ArgumentError("`ranks` needs one `reward` and one file of demonstrations")
     measured = _metrics(metrics)
     fields = tuple(one_of(tuple(FIELDS), one, "by") for one in texts(by))
     drawing = Precision(
         int(within("samples", samples, 2, MOST)),
         None if precision is None else within("precision", precision, 1e-3, 1),
     )
-    asked = pairs_in(pair)
-    subset = subset_in(condition, cycle, set, participant, trial)
-    known = [one.trained(everyone) if isinstance(one, LearntReward) else None for one in rewards.values()]
-    trained = known[0] if ranks else None
-    named = groups_named(subset.of(everyone), [name for one in asked for name in one], fields, "pair")
-    also = [one for own in (*named, *([chosen_to_rank(everyone, trained)[0]] if ranks else [])) for one in own]
-    taken = choose(everyone, subset, known, everything=all, also=also)
-    demos = taken.demonstrations
-    if ranks:
-        check_to_rank(demos, trained)
+    shares = tuple(within("quantiles", share, 0, 1) for share in np.atleast_1d(np.array(quantiles, dtype=float)))
+    pairs, subset = pairs_in(pair), subset_in(condition, cycle, set, participant, trial)
+    trained = [one.trained(everyone) if isinstance(one, LearntReward) else None for one in rewards.values()]
+    asked = asked_of(files, subset, trained, everything=all, pairs=pairs, fields=fields, ranked=ranks)
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
-    result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
-    compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in asked]
-    ranked = Ranking()
-    if ranks:
-        ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
-    inputs = [*sources_behind(everyone), *(file for one in rewards.values() for file in files_behind(one))]
-    document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
-    _warn(result.notes)
-    return Evaluation(result, measured, compared, ranked, document, (taken.note,) if taken.note else ())
+    found = answers_to(asked, learnt, measured, drawing, rng)
+    inputs = [one for own in files.values() for one in sources_behind(own)]
+    inputs += [file for one in rewards.values() for file in files_behind(one)]
+    document = metrics_document(found.result, found.pairs, found.ranked, measured, inputs, drawing, seed, shares)
+    _warn(found.result.notes)
+    if per_trial is not None:
+        write_per_trial(Path(per_trial), found.result, asked.files, measured)
+    return Evaluation(found.result, measured, found.pairs, found.ranked, document, asked.notes, shares)
 
 
 def policy(reward: PathLike | AnyReward, demonstration: Demonstration, *, person: str | None = None) -> ScenePolicy:

@@ -333,6 +333,7 @@ class Evaluation:
         ranks: Ranks of the demonstrations among paths of the policy, and how many were not ranked.
         document: The content of a metrics file.
         notes: Which demonstrations were measured, where the reward decided it.
+        quantiles: Shares whose quantiles were asked for.
     """
 
     comparison: Comparison
@@ -341,13 +342,14 @@ class Evaluation:
     ranks: Ranking
     document: Mapping[str, Any]
     notes: tuple[str, ...] = ()
+    quantiles: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         """The tables, as ``navirl evaluate`` prints them."""
         return "\n".join((self._written(Format.TEXT), *(f"note: {line}" for line in self.notes)))
 
     def _written(self, how: Format) -> str:
-        return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how)
+        return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how, quantiles=self.quantiles)
 
     def to_frame(self, table: str = "groups") -> "DataFrame":
         """One of the tables.

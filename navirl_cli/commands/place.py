@@ -1,15 +1,17 @@
 """Where to plan: the options of the section Scene, and the planning problem that they name."""
 
 from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from navirl_cli.artefacts.rewards import LearntReward, check_cells
 from navirl_cli.commands.choosing import NAMES as CHOICE_NAMES
 from navirl_cli.commands.choosing import Choosing, choice_options
-from navirl_cli.commands.shared import demonstrations_in
+from navirl_cli.commands.shared import demonstrations_in, say
 from navirl_cli.commands.types import FilePath, Number, Point, Pose
 from navirl_cli.commands.usage import Function, refuse_unused, section
 from navirl_cli.demos.demonstration import Demonstration
@@ -38,7 +40,16 @@ _scene_options = section(
 
 def scene_options(function: Function) -> Function:
     """The options of :class:`Place`; those of :func:`choice_options` choose among the demonstrations of ``--scene``."""
-    return choice_options(reward=True, title="Scene")(_scene_options(function))
+
+    @wraps(function)
+    def packed(scene: str | None, robot_radius: float | None, **others: Any) -> Any:
+        source = click.get_current_context().get_parameter_source("robot_radius")
+        if scene is not None and source is ParameterSource.DEFAULT_MAP:
+            robot_radius = None
+            say("`robot_radius` is that of the scene, with which its paths were extracted, not that of navirl.toml")
+        return function(scene=scene, robot_radius=robot_radius, **others)
+
+    return choice_options(reward=True, title="Scene")(_scene_options(packed))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """``navirl report``: one page on demonstrations and the reward learnt from them."""
 
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,6 +23,7 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.files import Input, replacing
 
@@ -62,6 +64,7 @@ def report(
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
+    from navirl_cli.reports.made import Made, changed_settings, subset_words
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
@@ -87,8 +90,15 @@ def report(
         figures = draw_report(
             demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
         )
-        made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
-        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, seed))
+        extracted = read_json(demos, "demonstrations")
+        made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        logs = tuple(one["file"] for one in extracted["inputs"])
+        changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
+        asked = [*subset_words(choosing.subset), *(["--all"] if choosing.everything else [])]
+        asked += ["--person", person] if person is not None else []
+        asked += ["--samples", str(samples), "--seed", str(seed)]
+        made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
+        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)

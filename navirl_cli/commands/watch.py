@@ -37,7 +37,8 @@ from navirl_cli.irl.selection import Steps
     click.option(
         "--reward",
         type=FilePath,
-        help="Earlier reward file as a Gaussian prior.  [default: learn from the recordings alone]",
+        help="Earlier reward file as prior: one reward as a Gaussian, or, of fit --pool persons, how earlier people "
+        "differ.  [default: learn from the recordings alone]",
     ),
     click.option(
         "--condition",
@@ -130,8 +131,6 @@ def watch(
 
     refuse_inputs([output / REWARD], [] if reward is None else [reward])
     earlier = None if reward is None else read_reward(reward)
-    if earlier is not None:
-        earlier.as_prior()  # refuses one that is no maximum before any work
     settings = ExtractSettings(
         split=Split(split),
         participant=participant,
@@ -144,11 +143,13 @@ def watch(
         occupancy=None if map_file is None else read_map(map_file),
         forces=Forces.IGNORED if no_wrench else Forces.NEEDED,
     )
+    choice = learning.Choice(conditions, Steps(steps), earlier, reward)
+    choice.prior  # noqa: B018 - refuses an earlier reward that is no maximum, before any work
     with new_folder(output):
         loop = Watch(
             Folder(folder, settle),
             Visit(output, settings, options, map_file),
-            learning.Choice(conditions, Steps(steps), earlier, reward),
+            choice,
             Limits(max_speed, max_acceleration),
             lambda line: click.echo(printable(line)),
             say,

@@ -15,7 +15,7 @@ from matplotlib.textpath import text_to_path
 
 from navirl_cli.arrays import BoolArray, FloatArray
 from navirl_cli.demos.grid import Grid
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.style import look, panel_width_in
 
 #: Limits of the view: x_min, x_max, y_min, y_max, m, map frame.

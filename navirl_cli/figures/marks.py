@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.ground import Window, frame, inside
 from navirl_cli.figures.scale import draw_scale_bar
 from navirl_cli.figures.style import look

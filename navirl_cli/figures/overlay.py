@@ -11,13 +11,14 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import LEARNT, PERSON_RADIUS_M
+from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.groups import by_group
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.style import colour_of, look
 
-#: Width of a path and of the light border around it, points; more paths than these have this opacity.
-_PATH_PT, _HALO_PT = 0.7, 1.3
-_MANY, _OPACITY = 10, 0.6
+#: Width of a path and of the light border around it, points; and of more paths than so many, with their opacity.
+_PATH_PT, _HALO_PT = 0.9, 2.1
+_MANY, _MANY_PT, _MANY_HALO_PT, _OPACITY = 10, 0.7, 1.3, 0.6
 #: Starts farther from each other than this are different tasks, m.
 SAME_START_M = 0.25
 
@@ -98,10 +99,11 @@ def draw_overlays(axes: Axes, overlays: Iterable[Overlay]) -> list[Line2D]:
     """
     lines = []
     for one in overlays:
-        opacity = 1.0 if len(one.lines_m) <= _MANY else _OPACITY
-        halo = withStroke(linewidth=_HALO_PT, foreground=look().paper, alpha=opacity / 2)
+        few = len(one.lines_m) <= _MANY
+        opacity, width, border = (1.0, _PATH_PT, _HALO_PT) if few else (_OPACITY, _MANY_PT, _MANY_HALO_PT)
+        halo = withStroke(linewidth=border, foreground=look().paper, alpha=0.8 if few else opacity / 2)
         for line_m in one.lines_m:
-            lines += axes.plot(*line_m.T, color=colour_of(one.key), linewidth=_PATH_PT, alpha=opacity, zorder=3.5)
+            lines += axes.plot(*line_m.T, color=colour_of(one.key), linewidth=width, alpha=opacity, zorder=3.5)
             lines[-1].set_path_effects([halo])
     return lines
 

@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 from zlib import crc32
@@ -163,14 +163,16 @@ def look() -> Look:
 
 
 @contextmanager
-def styled(name: str, font: str = "sans") -> Iterator[None]:
+def styled(name: str, font: str = "sans", dpi: int | None = None) -> Iterator[None]:
     """Open, draw and save figures in one of LOOKS within the context. The default is paper, without serifs.
 
     Args:
         name: A key of LOOKS.
         font: A key of FONTS.
+        dpi: Resolution in place of that of the look, dots per inch.
     """
-    tokens = _LOOK.set(LOOKS[name]), _FONT.set(font)
+    chosen = LOOKS[name] if dpi is None else replace(LOOKS[name], dpi=dpi)
+    tokens = _LOOK.set(chosen), _FONT.set(font)
     try:
         yield
     finally:

@@ -6,7 +6,7 @@ follow from the demonstrations alone, so that after a kill they are simply made 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -17,11 +17,14 @@ from navirl_cli.artefacts.rewards import LearntReward, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.subset import Subset
+from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.reach import ReachEffect, reach_effect
 from navirl_cli.figures.plan import draw_plans
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Analyses, Questions, answers
 from navirl_cli.irl.fit import Fit, fit
+from navirl_cli.irl.newcomer import Others, newcomer
+from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Selection, Steps, select
 from navirl_cli.planning.certainty import Certainty, certainty, passing_m
@@ -40,6 +43,8 @@ _SAME_M: Final = 0.25
 MOST_PATHS: Final = 6
 #: A maximum that is higher by this is another one, nats.
 _HIGHER: Final = 1e-3
+#: A mean over rewards that passes people at a distance that differs by this is worth other paths, m.
+_DIFFERS_M: Final = 0.01
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,22 @@ class Choice:
     earlier: LearntReward | None = None
     #: The earlier reward's file.
     earlier_file: Path | None = None
+
+    @property
+    def others(self) -> Others | None:
+        """Earlier people, where the earlier reward says how they differ."""
+        return None if self.earlier is None else self.earlier.others
+
+    @property
+    def prior(self) -> Prior | None:
+        """What is known before.
+
+        Raises:
+            RewardError: The earlier reward is no maximum.
+        """
+        if self.earlier is None:
+            return None
+        return self.earlier.as_prior() if self.others is None else _as_prior(self.others)
 
     @property
     def start(self) -> Reward:
@@ -95,24 +116,58 @@ def learn(demonstrations: Sequence[Demonstration], choice: Choice) -> Learnt:
     Raises:
         NavirlError: No demonstration is left, or the fit is impossible.
     """
-    selected = select(demonstrations, Subset(condition=choice.conditions), steps=choice.steps)
-    prior = None if choice.earlier is None else choice.earlier.as_prior()
-    found = fit(selected.evidence, choice.start, prior=prior, scan=False)
-    return Learnt(selected, found)
+    selected = select(demonstrations, Subset(choice.conditions), steps=choice.steps)
+    if choice.others is not None:
+        _one_participant(selected)
+    return Learnt(selected, fit(selected.evidence, choice.start, prior=choice.prior, scan=False))
 
 
-def confirmed(learnt: Learnt, choice: Choice) -> tuple[Learnt, bool]:
+def _one_participant(selected: Selection) -> str:
+    """The participant of whom all demonstrations are.
+
+    Raises:
+        DemonstrationError: They are of several.
+    """
+    names = sorted(set(selected.evidence.participants))
+    if len(names) > 1:
+        raise DemonstrationError(
+            "`reward`: holds a reward for each person, from which the next person's is learnt: expected recordings of "
+            f"one participant, found {', '.join(names)}; name the participant with `participant`"
+        )
+    return names[0]
+
+
+def _as_prior(others: Others) -> Prior:
+    """What earlier people say about the next one, as a normal distribution of the parameters at the typical person."""
+    scale = others.scale
+    typical = np.array(scale.at(others.spread.mean).theta)
+    errors = np.full(len(typical), np.nan)
+    errors[scale.varying] = typical[scale.varying] * others.spread.scatter
+    return Prior.gaussian(typical, np.diag(errors**2))
+
+
+def confirmed(learnt: Learnt, choice: Choice) -> tuple[Learnt, str]:
     """The same with the search for other maxima and with the analyses of ``navirl fit``.
 
     Returns:
-        What is learnt, and whether another maximum was found.
+        What is learnt, and why it differs; empty where the paths stay.
     """
     evidence, chosen = learnt.selection.evidence, learnt.selection.demonstrations
+    if choice.others is not None:
+        found, own = newcomer(evidence, choice.others, _one_participant(learnt.selection))
+        found = replace(found, prior=learnt.fit.prior)
+        differs = abs(learnt.passing_m(found.reward) - learnt.passing_m(learnt.fit.reward)) > _DIFFERS_M
+        why = "refined by the mean over all rewards that the person may have" if differs else ""
+        return Learnt(learnt.selection, found, Analyses((own,))), why
     found = fit(evidence, choice.start, prior=learnt.fit.prior)
-    moved = found.objective > learnt.fit.objective + _HIGHER
+    why = (
+        "corrected, because the likelihood has a higher maximum"
+        if found.objective > learnt.fit.objective + _HIGHER
+        else ""
+    )
     effect = reach_effect(chosen, found, choice.steps)
     found, analyses, lost = answers(evidence, found, Questions(), whole_paths=choice.steps is Steps.ALL)
-    return Learnt(learnt.selection, found, analyses, effect, tuple(lost)), moved
+    return Learnt(learnt.selection, found, analyses, effect, tuple(lost)), why
 
 
 def write_reward(output: Path, learnt: Learnt, choice: Choice, demos: Path) -> None:

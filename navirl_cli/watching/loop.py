@@ -103,10 +103,10 @@ class Watch:
             learnt = learn(self.visit.demonstrations(), self.choice)
             self._write(learnt, demos)
             self._say(learnt, before)
-            learnt, moved = confirmed(learnt, self.choice)
-            if moved:
+            learnt, why = confirmed(learnt, self.choice)
+            if why:
                 self._write(learnt, demos)
-                self._say(learnt, before, "corrected, because the likelihood has a higher maximum: ")
+                self._say(learnt, before, f"{why}: ")
             else:
                 write_reward(self.visit.output, learnt, self.choice, demos)
         except NavirlError as error:

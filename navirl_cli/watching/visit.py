@@ -125,7 +125,7 @@ class Visit:
         # as a restart reads them, so that it learns the same
         kept = tuple(demonstrations_of(document, one.key))
         self._counted[name] = replace(counted, demonstrations=kept)
-        return Added(True, lost, _notes(extraction, one.key, again=before is not None))
+        return Added(True, lost, _notes(extraction, one.key, before, counted))
 
     def _same(self, name: str, counted: Counted) -> str | None:
         """Why a recording counts already under another name; None if it does not."""
@@ -192,7 +192,10 @@ def _place(one: Demonstration) -> tuple[int, float, float]:
     return one.start_ns, x, y
 
 
-def _notes(extraction: Extraction, key: str, *, again: bool) -> tuple[str, ...]:
-    """What is unusual about a recording."""
-    changed = [f"{key}: has changed since it was counted, and counts as it is now"] if again else []
-    return (*changed, *extraction.notes, *(f"{d.id}: {note}" for d in extraction.demonstrations for note in d.notes))
+def _notes(extraction: Extraction, key: str, before: Counted | None, now: Counted) -> tuple[str, ...]:
+    """What is unusual about a recording, and why it is counted anew."""
+    again = []
+    if before is not None:
+        what = "options of the extraction have" if before.content == now.content else "it has"
+        again = [f"{key}: counted anew, because {what} changed"]
+    return (*again, *extraction.notes, *(f"{d.id}: {note}" for d in extraction.demonstrations for note in d.notes))

@@ -28,7 +28,6 @@ class Opener:
         raw: The file's bytes.
         damage: Where damage is added.
         definitions: Schemas and channels of the summary; those that the pieces define are added.
-        sure: Whether a CRC protects these definitions; if not, they are compared with those in the chunks.
         counted: Whether statistics count the messages of each channel: only they show what message indexes leave out.
         trust_indexes: False to ignore message indexes.
     """
@@ -39,12 +38,10 @@ class Opener:
         damage: DamageList,
         definitions: Definitions,
         *,
-        sure: bool,
         counted: bool,
         trust_indexes: bool,
     ) -> None:
         self._definitions = definitions
-        self._sure = sure
         #: Whether messages are found by message indexes, where a piece has them.
         self.by_index = counted and trust_indexes
         self._trust = trust_indexes
@@ -153,13 +150,12 @@ class Opener:
             yield batch
 
     def _has_indexes(self, piece: Piece) -> bool:
-        """Whether the message indexes of a piece can be used."""
+        """Whether the message indexes of a piece can be used.
+
+        A piece is walked over until all its channels were met: what the summary defines may differ from the data.
+        """
         known, met = self._definitions.knows, self._definitions.met
-        return (
-            self.by_index
-            and bool(piece.indexes)
-            and all(known(number) and (self._sure or number in met) for number in piece.indexes)
-        )
+        return self.by_index and bool(piece.indexes) and all(known(n) and n in met for n in piece.indexes)
 
     def _batch(self, piece: Piece, channel: Channel, opened: OpenedPiece, offsets: IntArray) -> Batch | None:
         return message_batch(channel, opened.raw, offsets, piece.number * _PIECE_ORDER)
