@@ -31,6 +31,7 @@ class Opener:
         sure: Whether a CRC protects these definitions; if not, they are compared with those in the chunks.
         counted: Whether statistics count the messages of each channel: only they show what message indexes leave out.
         trust_indexes: False to ignore message indexes.
+        checked: Gives a piece the reason why it is not opened.
     """
 
     def __init__(
@@ -42,7 +43,9 @@ class Opener:
         sure: bool,
         counted: bool,
         trust_indexes: bool,
+        checked: Callable[[Piece], Piece],
     ) -> None:
+        self._checked = checked
         self._definitions = definitions
         self._sure = sure
         #: Whether messages are found by message indexes, where a piece has them.
@@ -185,7 +188,7 @@ class Opener:
         if not self._definitions.knows(number):
             skipped, self._skipped = self._skipped, []
             for piece in skipped:
-                opened, _ = self.open(piece, None, lambda batch: batch)
+                opened, _ = self.open(self._checked(piece), None, lambda batch: batch)
                 self._define(piece, opened, self._records(piece, opened)[0])
         return number in self._definitions.channels
 
