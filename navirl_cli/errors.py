@@ -6,10 +6,16 @@ keeps its traceback.
 """
 
 from collections.abc import Iterable, Iterator
-from typing import ClassVar
+from typing import ClassVar, Final, cast
 
 #: Largest number of names that a message lists.
 MOST_NAMES = 20
+#: Letters of a value that a message shows, and letters that are written at most before it is cut.
+_LINE: Final = 60
+_MOST_WRITTEN: Final = 4 * _LINE
+#: Python refuses to write integers that are much longer.
+_MOST_BITS: Final = 10_000
+_BRACKETS: Final[dict[type, tuple[str, str]]] = {list: ("[", "]"), tuple: ("(", ")"), dict: ("{", "}"), set: ("{", "}")}
 #: Largest number of reasons that a message lists, and of letters of each.
 MOST_REASONS, MOST_LETTERS = 5, 700
 
@@ -93,35 +99,31 @@ def joined(reasons: Iterable[str], prefix: str = "") -> str:
 
 
 def brief(value: object) -> str:
-    """A value as a message shows it: on one line, cut to the length of a line."""
-    text = ""
-    for piece in _pieces(value):
+    """A value as a message shows it: on one line, cut to the length of a line; what is cut is never written out."""
+    text, cut = "", False
+    for piece in _written(value):
         text += piece
-        if len(text) > 400:  # what follows is cut
+        if cut := len(text) > _MOST_WRITTEN:
             break
     text = " ".join(text.split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if not cut and len(text) <= _LINE else f"{text[: _LINE - 3]}..."
 
 
-def _pieces(value: object) -> Iterator[str]:
-    """The `repr` of a value piece by piece, so that what is large or shared is never written out as a whole."""
-    if type(value) is list:
-        yield "["
-        for number, one in enumerate(value):
+def _written(value: object) -> Iterator[str]:
+    """What `repr` makes of a value, piece by piece, so that one that is nested or shared need not be written whole."""
+    if type(value) in _BRACKETS and value:
+        opening, closing = _BRACKETS[type(value)]
+        yield opening
+        for number, one in enumerate(cast("Iterable[object]", value)):
             yield ", " if number else ""
-            yield from _pieces(one)
-        yield "]"
-    elif type(value) is dict:
-        yield "{"
-        for number, (key, one) in enumerate(value.items()):
-            yield f"{', ' if number else ''}"
-            yield from _pieces(key)
-            yield ": "
-            yield from _pieces(one)
-        yield "}"
-    elif isinstance(value, str | bytes) and len(value) > 400:
-        yield repr(value[:400])
-    elif isinstance(value, int) and value.bit_length() > 14_000:  # Python does not write more digits
+            yield from _written(one)
+            if isinstance(value, dict):
+                yield ": "
+                yield from _written(value[one])
+        yield ",)" if type(value) is tuple and len(value) == 1 else closing
+    elif isinstance(value, str | bytes):
+        yield repr(value[: _MOST_WRITTEN + 1])
+    elif isinstance(value, int) and value.bit_length() > _MOST_BITS:
         yield f"an integer of {value.bit_length()} bits"
     else:
         yield repr(value)

@@ -59,11 +59,18 @@ def read_regular(path: Path) -> bytes:
         return file.read()
 
 
+def not_regular(mode: int) -> str:
+    """What a path is by the mode of its status, for a message after "found", with the remedy; "" for a regular file."""
+    if S_ISREG(mode):
+        return ""
+    name = next((name for is_one, name in _NOT_REGULAR if is_one(mode)), "something else")
+    remedy = "name a file in it" if S_ISDIR(mode) else "save its bytes to a file first"
+    return f"{name}, expected a regular file; {remedy}"
+
+
 def _check_regular(path: Path, mode: int) -> None:
-    if not S_ISREG(mode):
-        name = next((name for is_one, name in _NOT_REGULAR if is_one(mode)), "something else")
-        remedy = "name a file in it" if S_ISDIR(mode) else "save its bytes to a file first"
-        raise NotRegularError(EINVAL, f"expected a regular file, found {name}; {remedy}", str(path))
+    if reason := not_regular(mode):
+        raise NotRegularError(EINVAL, reason, str(path))
 
 
 @dataclass(frozen=True)

@@ -150,6 +150,8 @@ class Mutant:
     what: str
     #: Where the structure was changed and CRCs are right: the records of all chunks without compression.
     records: bytes | None = None
+    #: Whether bytes were changed after that, so that CRCs may be wrong.
+    hit: bool = False
 
 
 #: Share of the broken logs whose structure is changed, and of those whose bytes are changed after that.
@@ -163,10 +165,11 @@ def mutant(number: int, logs: Sequence[IntactLog], seed: int = 0) -> Mutant:
     count = (1, 1, 1, 1, 1, 2, 2, 3, 4, 5)[int(rng.integers(10))]
     if rng.random() < STRUCTURED_SHARE:
         new, records, done = rewritten(chosen, logs, rng, count)
-        if rng.random() < BOTH_SHARE:
+        hit = bool(rng.random() < BOTH_SHARE)
+        if hit:
             new, more = _broken(Breaking(chosen, logs, rng, bytearray(new)), 1)
-            done, records = done + more, None
-        return Mutant(number, chosen, compressed(new, chosen.compression), ", ".join(done), records)
+            done += more
+        return Mutant(number, chosen, compressed(new, chosen.compression), ", ".join(done), records, hit)
     # of a compressed file, either what is stored or what it decompresses to is broken
     outside = chosen.compression and rng.random() < 0.5
     data, done = _broken(Breaking(chosen, logs, rng, bytearray(chosen.stored if outside else chosen.data)), count)

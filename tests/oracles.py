@@ -213,6 +213,52 @@ def turn_flow(
     return flow
 
 
+# --- people who differ ---------------------------------------------------------------------------------------------
+
+
+def scattered_people(
+    log_likelihoods: FloatArray, places: FloatArray, means: FloatArray, scatters: FloatArray, width: float
+) -> dict[str, FloatArray]:
+    """All that is unknown about people who are scattered in one variable, on a grid and without any approximation.
+
+    Person i has y_i ~ N(m, s^2) and is seen through a log-likelihood. The mean m may be anywhere; s is beforehand half
+    normal.
+
+    Args:
+        log_likelihoods: (people, places) of each person.
+        places: Even grid of y.
+        means: Even grid of m.
+        scatters: Grid of s, even in its logarithm.
+        width: Of the distribution of s.
+
+    Returns:
+        "mean": expectation and standard deviation of m; "scatter": median of s; "people": (people, 2) expectation and
+        standard deviation of y_i.
+    """
+    step = places[1] - places[0]
+    weight = np.zeros((len(means), len(scatters)))
+    first, second = np.zeros((2, len(log_likelihoods), len(means), len(scatters)))
+    for i, m in enumerate(means):
+        for j, s in enumerate(scatters):
+            prior = -0.5 * ((places - m) / s) ** 2 - log(s * sqrt(2 * np.pi))
+            each = np.exp(log_likelihoods + prior) * step
+            of_person = each.sum(axis=1)
+            # the density of log s is s times that of s
+            weight[i, j] = np.log(of_person).sum() - 0.5 * (s / width) ** 2 + log(s)
+            first[:, i, j] = each @ places / of_person
+            second[:, i, j] = each @ places**2 / of_person
+    weight = np.exp(weight - weight.max())
+    weight /= weight.sum()
+    expected = float(weight.sum(axis=1) @ means)
+    spread = sqrt(float(weight.sum(axis=1) @ (means - expected) ** 2))
+    y = (first * weight).sum(axis=(1, 2))
+    return {
+        "mean": np.array([expected, spread]),
+        "scatter": np.interp(0.5, np.cumsum(weight.sum(axis=0)) - 0.5 * weight.sum(axis=0), scatters)[None],
+        "people": np.column_stack([y, np.sqrt((second * weight).sum(axis=(1, 2)) - y**2)]),
+    }
+
+
 # --- derivatives ----------------------------------------------------------------------------------------------------
 
 

@@ -213,7 +213,8 @@ def _take(data: bytes, record: Record, found: StrictLog) -> None:
         channel, size = struct.unpack_from("<HI", content)
         if size % 16 or 6 + size > len(content):
             raise FaultError("the size of a message index is wrong")
-        found.indexed[channel] = found.indexed.get(channel, 0) + size // 16
+        places = {struct.unpack_from("<Q", content, at)[0] for at in range(14, 6 + size, 16)}
+        found.indexed[channel] = found.indexed.get(channel, 0) + len(places)
     elif record.code == METADATA:
         metadata(content)
     elif record.code in {SCHEMA, CHANNEL, MESSAGE}:

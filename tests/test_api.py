@@ -120,7 +120,11 @@ def test_keywords_are_the_options_with_their_defaults(function, path):
     }
     options = options_of(*path)
     beyond = {"executor", "axes", "page", "demos", "demonstration", "reward", "name"}
-    of_the_shell = {"wide", "style", "trial", "group", "reward"}
+    # `name` of plot.profile is one --parameter
+    of_the_shell = {"parameter", "wide", "style", "font", "group", "reward"}
+    of_the_shell |= {"trial"} if "trial" not in keywords else set()
+    if "demonstration" in keywords:  # which demonstrations.select chooses
+        of_the_shell |= {"condition", "cycle", "set", "participant", "all"}
     # the table of trials is a file to fill in
     table = {"trials", "split", "goal", "frame"} if path == ("inspect",) else set()
     missing = set(options) - set(keywords) - of_the_shell - table
@@ -168,6 +172,19 @@ class TestResults:
         found.write("metrics.csv")
         assert Path("metrics.csv").read_text().startswith("group,path_type,n,length_m")
 
+    def test_demonstrations_are_chosen_as_on_the_command_line(self, demos, reward):
+        some = demos.select(cycle=2, participant=["p01", "p02"])
+        assert [one.id for one in some] == ["p01/3", "p01/4", "p02/3", "p02/4"]
+        assert some.sources() == demos.sources()
+        with pytest.raises(navirl.NavirlError, match=r"`cycle`: expected one of 'cycle 1', .* found 'cycle 9'"):
+            demos.select(cycle=9)
+        found = navirl.evaluate(demos, reward, metrics="length_m", samples=5)
+        assert {one["id"] for one in found.document["demonstrations"]} == set(reward.demonstrations)
+        assert "those that the reward was learnt from; `all` takes the others too" in repr(found)
+        days = navirl.evaluate({"one": some, "other": demos}, metrics="length_m", quantiles=0.5, cycle=2)
+        assert days.document["pairs"][0]["minus"] == "one: force, cycle 2"
+        assert {one["share"] for one in days.document["quantiles"]} == {0.5}
+
     def test_a_policy_lies_on_its_grid(self, demos, reward):
         where = navirl.policy(reward, demos[0])
         free = np.isfinite(where.visits)
@@ -192,7 +209,7 @@ class TestFrames:
         pytest.importorskip("pandas")
         assert len(demos.to_frame()) == len(demos)
         assert list(reward.to_frame()["name"]) == ["c0", "a_g", "a_p", "sigma_p"]
-        found = navirl.evaluate(demos, reward, pair=("force, cycle 2", "joystick"), ranks=True, samples=20)
+        found = navirl.evaluate(demos, reward, all=True, pair=("force, cycle 2", "joystick"), ranks=True, samples=20)
         groups = found.to_frame()
         assert groups.loc[groups["path_type"] == "driven", "length_m_mean"].notna().all()
         assert len(found.to_frame("demonstrations")) == len(demos)
@@ -271,7 +288,7 @@ class TestErrors:
             (lambda _d, r: r["c1"], "parameter: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'"),
             (
                 lambda d, r: navirl.plot.policy(r, d[0], overlay="paths"),
-                "`overlay`: expected one of 'demos', 'samples'",
+                "`overlay`: expected one of 'demos', 'all', 'samples'",
             ),
             (
                 lambda d, r: navirl.plot.policy(r, d[0], style="grey"),

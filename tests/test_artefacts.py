@@ -200,7 +200,7 @@ def test_broken_demonstrations_are_refused_with_the_place(demos, change, message
         (lambda d: d.update(start_ns=2**63), "start_ns: expected 9.22337e"),
         (
             lambda d: d.update(set="\ud800"),
-            "expected a JSON file of navirl demonstrations, found none .*surrogates not all",
+            r"expected a JSON file of .*, found none \(\\ud800, half of a surrogate pair, which no text has; write",
         ),
     ],
 )

@@ -7,6 +7,7 @@ from statistics import NormalDist
 import factories as make
 import numpy as np
 import pytest
+from executors import Here
 
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl import bootstrap as module
@@ -19,13 +20,6 @@ from navirl_cli.irl.series import InfinitePartitionError, ValueStatus
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))
 START = Reward.named({})
-
-
-class Here:
-    """An executor that runs everything where it stands."""
-
-    def map(self, function, items):
-        return map(function, items)
 
 
 @pytest.fixture(scope="module")

@@ -277,7 +277,7 @@ def test_errors_of_fit_are_one_line(navirl, work, tmp_path):
 
 
 def test_evaluate_prints_a_table_json_and_csv_of_the_same_numbers(navirl, work):
-    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "20")
+    words = ("evaluate", work / "demos.json", "--reward", work / "reward.json", "--samples", "20", "--all")
     table = navirl(*words, "-o", "metrics.csv").stdout
     document = json.loads(navirl(*words, "--json", "-o", "metrics.json").stdout)
     assert read_json(Path("metrics.json"), "metrics")["groups"] == document["groups"]

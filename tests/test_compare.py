@@ -27,6 +27,7 @@ from navirl_cli.evaluation.compare import (
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import group_of
 from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric
+from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
@@ -312,8 +313,8 @@ def test_a_new_metric_is_its_declaration_and_nothing_else():
     assert means[NOMINAL] == pytest.approx(0.0, abs=1e-9)
     assert means[DRIVEN] == means[ON_GRID] == pytest.approx(0.7)
     assert 0.2 < means[LEARNT] < 1.0
-    text = evaluation_text(comparison, [], [], metrics, Format.TEXT)
+    text = evaluation_text(comparison, [], Ranking(()), metrics, Format.TEXT)
     assert re.search(r"^joystick +driven +1 +0.700 ", text, re.MULTILINE)
     assert "furthest: largest distance from the nominal path" in text
-    content = metrics_document(comparison, [], [], metrics, [], Precision(200), 0)
+    content = metrics_document(comparison, [], Ranking(()), metrics, [], Precision(200), 0)
     assert content["demonstrations"][2]["metrics"]["furthest_m"] == pytest.approx(0.7)

@@ -67,6 +67,15 @@ def test_trials_and_groups_of_the_demonstrations_at_hand(demos):
     assert completed("evaluate", demos, "--by", "participant", "--pair", "") == ["p01"]
 
 
+def test_names_that_choose_demonstrations(demos):
+    assert completed("fit", demos, "--cycle", "") == ["1", "2"]
+    assert completed("evaluate", demos, "--participant", "") == ["p01"]
+    assert completed("plot", "paths", demos, "--set", "") == ["main task"]
+    assert completed("select", demos, "--trial", "p01/7") == ["p01/7"]
+    assert completed("plan", "r.json", "--scene", demos, "--trial", "p01/7") == ["p01/7"]
+    assert completed("plan", "r.json", "--scene", f"{demos}:p01/3", "--cycle", "") == ["1", "2"]
+
+
 def test_roles_and_topics_of_the_log_at_hand():
     assert completed("extract", "--topic", "") == [f"{role.name}=" for role in ROLES]
     assert completed("extract", LOG, "--topic", "w") == ["wrench=/wrench"]

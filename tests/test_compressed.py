@@ -12,6 +12,7 @@ import pytest
 import zstandard
 
 from navirl_cli.errors import LogError
+from navirl_cli.logs.container import compressed
 from navirl_cli.logs.container.compressed import open_log
 from navirl_cli.logs.container.records import MAGIC
 
@@ -311,7 +312,7 @@ def test_a_file_without_permission_to_read(tmp_path, monkeypatch):
     def refuse(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(type(path), "open", refuse)
+    monkeypatch.setattr(compressed, "open_regular", refuse)
     with pytest.raises(
         LogError, match=r"log.mcap: expected a readable file, found: Permission denied; check its rights"
     ):
@@ -322,10 +323,9 @@ def test_a_read_error_of_the_disk_is_not_reported_as_a_full_disk(tmp_path, monke
     path = tmp_path / "log.mcap.zstd"
     blob = zstd(content())
     path.write_bytes(blob)
-    real = type(path).open
 
-    def failing(self, mode):
-        file = real(self, mode)
+    def failing(path):
+        file = path.open("rb")
 
         def read(count):
             if file.tell() + count > len(blob) // 2:
@@ -336,7 +336,7 @@ def test_a_read_error_of_the_disk_is_not_reported_as_a_full_disk(tmp_path, monke
         watched.read = read
         return Entered(watched)
 
-    monkeypatch.setattr(type(path), "open", failing)
+    monkeypatch.setattr(compressed, "open_regular", failing)
     with pytest.raises(
         LogError,
         match=rf"expected {len(blob)} readable bytes, found: Input/output error after byte \d+; copy what can be read",

@@ -164,6 +164,19 @@ def test_a_message_whose_text_is_not_utf8_does_not_decode(path):
     assert "'utf-8' codec can't decode byte 0xff" in decoded.error
 
 
+def test_equal_messages_that_do_not_decode_are_decoded_once(monkeypatch):
+    """A small chunk can unpack to millions of empty messages."""
+    tried = []
+    schema = parse_definition("a_msgs/msg/A", "ros2msg", "string word\n")
+    whole = type(schema).deserialize
+    monkeypatch.setattr(type(schema), "deserialize", lambda self, data: tried.append(data) or whole(self, data))
+    good, bad, worse = b"\0\1\0\0\3\0\0\0ab\0", b"\0\1\0\0\3\0\0\0\xffb\0", b"\0\1\0\0\x09\0\0\0ab\0"
+    decoded = decode.Decoder(schema, ("word",)).decode(batch_of([b"", bad, worse, good, *[b"", worse] * 500]))
+    assert (decoded.order.tolist(), decoded.count) == ([3], 1004)
+    assert decoded.columns["word"].tolist() == ["ab"]
+    assert len(tried) < 10
+
+
 def test_messages_smaller_than_the_array_of_their_definition_take_no_memory(tmp_path):
     definitions = {"a_msgs/msg/A": ("ros2msg", "float64[200000000] d\n")}
     messages = [forge.Message("/a", "a_msgs/msg/A", k, b"\0\1\0\0" + bytes(288)) for k in range(50)]

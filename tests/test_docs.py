@@ -24,8 +24,12 @@ SLOW = {
     "index.md",
     "nav2-study.md",
     "other-rewards.md",
+    "plan.md",
+    "persons.md",
     "published-study.md",
+    "settings.md",
     "several-rewards.md",
+    "visit.md",
 }
 
 

@@ -1,7 +1,7 @@
 """A report's page in a browser: it opens, sorts, enlarges, prints, and can be read on a phone and in the dark."""
 
 import re
-from base64 import b64decode
+from base64 import b64decode, b64encode
 
 import pytest
 from browser import CHROMIUM, Browser
@@ -14,11 +14,17 @@ from navirl_cli.documents.tables import Column, Spread, Table
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found; on Debian: apt-get install chromium")
 
 
+#: Names of the files of one picture for other screens.
+SCREENS = ("dark", "narrow", "narrow_dark")
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     """A browser that has the page of a report open."""
     folder = tmp_path_factory.mktemp("page")
     Image.new("RGB", (1400, 800), "#0072B2").save(folder / "wide.png")
+    for name, colour in (("light", "#ffffff"), ("dark", "#141414"), ("narrow", "#ff0000"), ("narrow_dark", "#00ff00")):
+        Image.new("RGB", (200 if "narrow" in name else 1200, 2400), colour).save(folder / f"{name}.png")
     (folder / "line.svg").write_text(
         "<svg xmlns='http://www.w3.org/2000/svg' width='90' height='60'><path style='fill: red' d='M0 0H90V60z'/></svg>"
     )
@@ -61,6 +67,8 @@ def report_with(folder):
             Bullets(("one", "two")),
             Picture(folder / "wide.png", "A `wide` one.", "blue"),
             Picture(folder / "line.svg", "A drawing."),
+            Table((Column("trial"), Column("condition")), (("participant-with-a-name/1", "autonomous"),) * 2),
+            Picture(folder / "light.png", "Of every screen.", "screens", *(folder / f"{n}.png" for n in SCREENS)),
         ),
         "Made by a test.",
     )
@@ -81,7 +89,7 @@ def complaints(page):
 
 def test_it_opens_from_a_file_without_messages_or_requests(page):
     images = "[...document.querySelectorAll('figure img')]"
-    assert page.run(f"{images}.map(image => image.complete && image.naturalWidth)") == [1400, 90]
+    assert page.run(f"{images}.map(image => image.complete && image.naturalWidth)") == [1400, 90, 1200]
     assert page.run("document.title") == "What a robot learnt"
     assert complaints(page) == []
     sent = [
@@ -133,7 +141,7 @@ def test_a_key_sorts_too(page):
 
 def test_only_headers_with_a_name_and_something_to_sort_are_buttons(page):
     buttons = "[...document.querySelectorAll('table')].map(table => table.querySelectorAll('button').length)"
-    assert page.run(buttons) == [2, 11, 0]
+    assert page.run(buttons) == [2, 11, 0, 2]
 
 
 def test_a_figure_is_enlarged_by_click_or_key_and_closed_again(page):
@@ -191,6 +199,39 @@ def test_texts_stand_out_and_figures_stay_on_white(page, scheme):
     assert min(measured["found"].values()) >= 4.5, measured["found"]
     assert (measured["paper"] < 0.05) == (scheme == "dark")
     assert measured["card"] == [255, 255, 255]
+
+
+@pytest.mark.parametrize(
+    ("width", "scheme", "name"),
+    [(1280, "light", "light"), (1280, "dark", "dark"), (360, "light", "narrow"), (360, "dark", "narrow_dark")],
+)
+def test_a_picture_is_that_of_the_screen(page, width, scheme, name):
+    page.show(width=width, scheme=scheme)
+    page.open(page.path)
+    image = "document.querySelector('picture img')"
+    address = b64encode((page.path.parent / f"{name}.png").read_bytes()).decode()
+    assert page.run(f"{image}.currentSrc") == f"data:image/png;base64,{address}"
+    ground = page.run(f"getComputedStyle({image}).backgroundColor")
+    assert ground == ("rgb(20, 20, 20)" if scheme == "dark" else "rgb(255, 255, 255)")
+    page.run(f"{image}.click()")
+    assert page.run("document.querySelector('dialog img').src").endswith(address)
+    assert page.run("getComputedStyle(document.querySelector('dialog')).backgroundColor") == ground
+
+
+def test_names_in_tables_are_not_broken(page):
+    page.show(width=360)
+    lines = """[...document.querySelectorAll('tbody th, tbody td')]
+        .filter(cell => /^(participant-with-a-name.1|autonomous)$/.test(cell.textContent))
+        .map(cell => { const range = document.createRange(); range.selectNodeContents(cell);
+            return new Set([...range.getClientRects()].map(box => Math.round(box.top))).size; })"""
+    assert page.run(lines) == [1] * 4
+
+
+def test_no_figure_leaves_half_of_a_sheet_empty(page):
+    page.call("Emulation.setEmulatedMedia", media="print")
+    heights = page.run("[...document.querySelectorAll('figure img')].map(one => one.getBoundingClientRect().height)")
+    page.call("Emulation.setEmulatedMedia", media="")
+    assert max(heights) <= 105 / 25.4 * 96 + 1  # mm
 
 
 def test_it_prints_on_a4(page):

@@ -112,7 +112,16 @@ def test_without_a_pair_no_statistics_are_imported(work):
         "import sys; from navirl_cli.cli import cli; cli(sys.argv[1:], standalone_mode=False); "
         "sys.exit(', '.join(name for name in ('scipy.stats', 'scipy.signal') if name in sys.modules) or None)"
     )
-    words = [sys.executable, "-c", program, "evaluate", str(work / "demos.json"), "--reward", str(work / "learnt.json")]
+    words = [
+        sys.executable,
+        "-c",
+        program,
+        "evaluate",
+        str(work / "demos.json"),
+        "--reward",
+        str(work / "learnt.json"),
+        "--all",
+    ]
     found = subprocess.run([*words, "--metrics", "all", "--samples", "2"], capture_output=True, text=True, check=False)
     assert (found.returncode, found.stderr) == (0, "")
 
@@ -151,7 +160,7 @@ def test_groups_by_participant(navirl, work):
 
 
 def test_ranks_are_printed_with_their_test(navirl, work):
-    words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--ranks", "--samples", "200")
+    words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--ranks", "--samples", "200", "--all")
     document = json.loads(navirl(*words, "-o", "m.json", "--json").stdout)
     ranks = document["ranks"]
     assert read_json(Path("m.json"), "metrics")["ranks"] == ranks
@@ -201,3 +210,57 @@ def test_formats_hold_the_same_numbers(navirl, work):
     assert cell.replace("±", r"$\pm$") in latex
     assert Path("table.tex").read_text() == latex
     assert "area under path m$^2$" in latex
+
+
+def test_files_stand_in_one_table_and_their_groups_are_compared(navirl, work):
+    for name, number in (("a", 1), ("b", 2)):
+        navirl("select", work / "demos.json", "--condition", "force", "--cycle", number, "-o", f"{name}.json")
+    for name, cycle in (("a", None), ("b", None)):  # the same group in both
+        content = json.loads(Path(f"{name}.json").read_text())
+        content["demonstrations"] = [{**one, "cycle": cycle} for one in content["demonstrations"]]
+        Path(f"{name}.json").write_text(json.dumps(content))
+    words = ("evaluate", "a.json", "b.json", "--metrics", "length_m,area_m2", "--quantiles", "0.25,0.5")
+    document = json.loads(navirl(*words, "--json", "-o", "m.json", "--per-trial", "t.csv").stdout)
+    assert read_json(Path("m.json"), "metrics")["pairs"] == document["pairs"]
+    assert {one["group"] for one in document["groups"]} == {"a: force", "b: force"}
+    (pair,) = document["pairs"]
+    assert (pair["group"], pair["minus"]) == ("b: force", "a: force")
+    for one in pair["metrics"].values():
+        assert one["n"] == 3
+        assert one["wilcoxon_p"] <= one["holm_p"] <= 1
+    rows = list(csv.DictReader(io.StringIO(Path("t.csv").read_text())))
+    driven = [row for row in rows if row["path_type"] == "driven" and row["metric"] == "length_m"]
+    assert len(driven) == len(document["demonstrations"])
+    own = [float(row["value"]) for row in driven if row["file"] == "a"]
+    by_group = {(one["group"], one["path_type"]): one for one in document["groups"]}
+    assert np.mean(own) == pytest.approx(by_group["a: force", "driven"]["mean"]["length_m"])
+    quantiles = {(one["group"], one["path_type"], one["share"]): one["metrics"] for one in document["quantiles"]}
+    for share in (0.25, 0.5):
+        assert quantiles["a: force", "driven", share]["length_m"] == pytest.approx(np.quantile(own, share))
+    text = navirl(*words).stdout
+    assert "b: force - a: force, driven paths, paired by participant" in text
+    assert "p (Holm) is corrected for all tests of these tables." in text
+    assert "one twice" in navirl("evaluate", "a.json", "a.json", code=2).stderr
+    words = ("evaluate", "a.json", "b.json", "--reward", work / "learnt.json", "--ranks")
+    assert "--ranks needs one file of demonstrations" in navirl(*words, code=2).stderr
+    assert "expected numbers from 0 to 1" in navirl("evaluate", "a.json", "--quantiles", "2", code=2).stderr
+
+
+def test_learnt_paths_of_rewards_are_compared_in_each_group(navirl, work):
+    words = ("evaluate", work / "demos.json", "--reward", work / "learnt.json", "--reward", work / "first.json")
+    words = (*words, "--cycle", "2", "--samples", "30", "--metrics", "length_m")
+    document = json.loads(navirl(*words, "--json", "--per-trial", "t.csv").stdout)
+    (pair,) = document["pairs"]
+    assert (pair["group"], pair["minus"]) == ("force, cycle 2: learnt, first", "learnt, learnt")
+    rows = list(csv.DictReader(io.StringIO(Path("t.csv").read_text())))
+    means = {
+        name: {
+            person: np.mean([float(r["value"]) for r in rows if (r["path_type"], r["participant"]) == (name, person)])
+            for person in ("p01", "p02", "p03")
+        }
+        for name in ("learnt, learnt", "learnt, first")
+    }
+    found = pair["metrics"]["length_m"]
+    for person, value in found["by_participant"].items():
+        assert value == pytest.approx(means["learnt, first"][person] - means["learnt, learnt"][person])
+    assert "holm_p" not in found, "one test needs no correction"

@@ -113,15 +113,17 @@ def test_people_are_outlines_that_hide_neither_colours_nor_the_nominal_path(valu
     draw = draw_policy if values == "policy" else draw_reward
     drawn = draw(one_axes(), a_scene, visits, robot_radius_m=0.3)
     (person,) = drawn.people
-    assert not any(patch.get_fill() for patch in drawn.axes.patches)
+    filled = [patch for patch in drawn.axes.patches if patch.get_fill()]
+    assert len(filled) == (values == "policy"), "no visits are that near to the person"
+    assert all(patch.get_zorder() < drawn.nominal.get_zorder() for patch in filled)
     assert to_rgba(person.get_edgecolor()) == to_rgba("black")
     (halo,) = person.get_path_effects()
     assert to_rgba(halo._gc["foreground"]) == to_rgba("white")
     assert halo._gc["linewidth"] > person.get_linewidth()
-    (robot,) = [patch for patch in drawn.axes.patches if patch is not person]
+    (robot,) = [patch for patch in drawn.axes.patches if patch not in {person, *filled}]
     assert person.get_linewidth() >= 2 * robot.get_linewidth()  # so that the two are not taken for each other
     entries = dict(zip(legend_texts(drawn.axes), drawn.axes.get_legend().legend_handles, strict=True))
-    assert entries["person"].get_markerfacecolor() == "none"
+    assert entries["person"].get_markerfacecolor() == ("#F0E442" if filled else "none")
     assert entries["person"].get_markeredgewidth() == person.get_linewidth()
 
 

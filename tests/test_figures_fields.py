@@ -8,6 +8,7 @@ from matplotlib.colors import to_hex
 
 from navirl_cli.demos.grid import MOVES
 from navirl_cli.figures.actions import draw_actions
+from navirl_cli.figures.overlay import overlays_of
 from navirl_cli.figures.sheet import settle
 from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
@@ -45,6 +46,28 @@ def test_contours_are_where_the_value_is_theirs():
                 assert POLICY.value[around].min() <= level <= POLICY.value[around].max()
                 checked += 1
     assert checked > 100
+
+
+def test_contours_have_numbers_and_people_hide_the_colours_below_them():
+    drawn = draw_value(one_axes(), SCENE, POLICY.value)
+    levels = [f"{level:g}".replace("-", "\N{MINUS SIGN}") for level in drawn.contours.levels]
+    numbers = [number.get_text() for number in drawn.numbers]
+    assert len(set(numbers)) >= 3
+    assert set(numbers) <= set(levels)
+    low, high = drawn.axes.get_ylim()
+    assert all(low < number.get_position()[1] < high for number in drawn.numbers)
+    (outline,) = drawn.people
+    filled = [patch for patch in drawn.axes.patches if patch.center == outline.center and patch.get_fill()]
+    assert to_hex(filled[0].get_facecolor()) == LOOKS["paper"].person.lower()
+
+
+def test_arrows_below_paths_are_fewer_and_fainter():
+    probability = POLICY.probability_by_cell(SCENE.start)
+    alone = draw_actions(one_axes(), SCENE, probability)
+    below = draw_actions(one_axes(), SCENE, probability, overlays=overlays_of([demonstration()]))
+    assert len(below.states) < 0.4 * len(alone.states)
+    assert (alone.arrows.get_alpha(), below.arrows.get_alpha()) == (1.0, 0.5)
+    assert below.colour_bar.alpha in {None, 1.0}
 
 
 def test_the_value_of_a_window_spans_what_it_shows():

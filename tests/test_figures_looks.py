@@ -12,7 +12,7 @@ from PIL import Image
 
 from navirl_cli.figures.cells import draw_policy, draw_reward
 from navirl_cli.figures.paths import draw_paths
-from navirl_cli.figures.sheet import new_figure, save_figure
+from navirl_cli.figures.sheet import new_figure, save_figure, settle
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, DARK_COLOURS, DPI, LOOKS, colour_of, look, styled
 
 #: Least contrast of what is no text to its ground (WCAG 2.1, 1.4.11), and of text (1.4.3).
@@ -47,6 +47,25 @@ def test_groups_are_distinct_in_the_dark_for_every_colour_vision():
             assert apart > 18, (one, other, sight)
 
 
+def test_special_sets_are_distinct_from_the_main_groups_for_every_colour_vision():
+    for colours in (COLOURS, DARK_COLOURS):
+        for other in ("force, cycle 1", "force, cycle 2", "force, later cycles", "joystick", "autonomous"):
+            for sight, matrix in SIGHTS.items():
+                apart = np.linalg.norm(lab(colours["set 1"], matrix) - lab(colours[other], matrix))
+                assert apart > 18, (other, sight)
+
+
+def test_letters_of_ieee_papers_are_drawn_on_request():
+    with styled("paper", "times"):
+        figure, (axes,) = new_figure(COLUMN_IN, 2.0)
+        axes.set_xlabel("force\n[N]")
+        axes.set_ylabel(r"$\sigma_p$", parse_math=True)
+        settle(figure, trim=False)
+        assert axes.xaxis.label.get_fontname() == "STIXGeneral"
+        assert axes.xaxis.label._linespacing < 1.0, "its lines are high"
+    assert one_axes().xaxis.label.get_fontname() == "DejaVu Sans"
+
+
 def test_letters_are_legible_in_every_look():
     for name, one in LOOKS.items():
         assert contrast(one.ink, one.paper) > 2 * TEXT, name
@@ -57,7 +76,8 @@ def test_a_look_lasts_as_long_as_its_context():
     with styled("dark"):
         assert look() is LOOKS["dark"]
         assert colour_of("joystick") == DARK_COLOURS["joystick"]
-        assert colour_of("force, cycle 5, obstacle course") == DARK_COLOURS["force, later cycles"]
+        assert colour_of("force, cycle 5") == DARK_COLOURS["force, later cycles"]
+        assert colour_of("force, cycle 5, obstacle course") == DARK_COLOURS["set 1"]
     assert look() is LOOKS["paper"]
     assert colour_of("joystick") == COLOURS["joystick"]
     with pytest.raises(RuntimeError), styled("dark"):

@@ -64,6 +64,21 @@ def test_the_scale_bar_takes_the_corner_that_is_free():
     assert corner(south, west) == (True, True)
 
 
+def test_a_scale_bar_that_would_hide_something_is_left_out():
+    around = [(-3.9, y) for y in (-1.9, -1.8, 1.8, 1.9)]
+    ones = [replace(demonstration(), xy_m=np.linspace((x, y), (3.9, y), 101)) for x, y in around]
+    drawn = draw_paths(one_axes(), ones, window_m=room().extent_m)
+    assert drawn.marks.scale_bar is None
+    assert not drawn.axes.texts
+
+
+def test_a_scale_bar_hides_no_visited_cells():
+    a_scene = scene()
+    everywhere = np.where(a_scene.lattice.xy_m[:, 1] < 0.9, 0.1, 0.0)
+    drawn = draw_policy(one_axes(), a_scene, everywhere)
+    assert drawn.marks.scale_bar.get_xydata()[0, 1] > 1.0
+
+
 def test_a_goal_outside_of_the_map_is_an_arrow_at_its_border():
     far = replace(demonstration(), goal_m=(50.0, 30.0))
     drawn = draw_paths(one_axes(), [demonstration(), far])
@@ -126,9 +141,17 @@ def test_a_cropped_map_includes_paths_and_the_people_near_them():
     drawn = draw_paths(one_axes(), [one], crop=True)
     low, high = one.xy_m.min(axis=0), one.xy_m.max(axis=0)
     margin = CROPPED_M
-    expected = (low[0] - margin, high[0] + margin, low[1] - margin, 1.5 + 0.25 + 0.1)
+    expected = (low[0] - margin, high[0] + margin, low[1] - margin, 1.5 + 0.25 + 0.75)
     assert (*drawn.axes.get_xlim(), *drawn.axes.get_ylim()) == pytest.approx(expected)
     assert "person" in legend_texts(drawn.axes)  # the near one alone
+
+
+def test_a_crop_has_room_for_a_robot_on_either_side_of_a_person():
+    grid = room(800, 800, (-40.0, -40.0))
+    one = demonstration(grid=grid, people_m=[(0.0, 0.0)], aside_m=1.0)
+    low, high = draw_paths(one_axes(), [one], crop=True).axes.get_ylim()
+    assert low <= -0.25 - 2 * one.robot_radius_m
+    assert high > 1.0
 
 
 def test_a_crop_ends_with_a_small_map():

@@ -15,7 +15,7 @@ from navirl_cli.artefacts.rewards import Analyses, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.cli import cli
 from navirl_cli.errors import ArtefactError
-from navirl_cli.figures.profile import draw_profile, draw_profiles, symbol_of
+from navirl_cli.figures.profile import chosen_profiles, draw_profile, draw_profiles, symbol_of
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, house_style
 from navirl_cli.irl.evidence import evidence_of
@@ -256,16 +256,16 @@ def test_ticks_are_few(order, count, width_in):
 @pytest.mark.parametrize(
     ("count", "width_in", "message"),
     [
-        (3, COLUMN_IN, "3 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or fit"),
-        (4, COLUMN_IN, "4 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or fit"),
-        (5, COLUMN_IN, "5 profiles side by side are not legible in 3.5 in: expected 2 at most; fit"),
-        (5, PAGE_IN, "5 profiles side by side are not legible in 7.16 in: expected 4 at most; fit"),
+        (3, COLUMN_IN, "3 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or name"),
+        (4, COLUMN_IN, "4 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or name"),
+        (5, COLUMN_IN, "5 profiles side by side are not legible in 3.5 in: expected 2 at most; name"),
+        (5, PAGE_IN, "5 profiles side by side are not legible in 7.16 in: expected 4 at most; name"),
     ],
 )
 def test_more_profiles_than_fit_are_refused(count, width_in, message):
     with pytest.raises(ArtefactError) as caught:
         draw_profiles([*common(), parabola()][:count], UNITS, width_in)
-    assert str(caught.value) == f"{message} again with fewer parameters in `profile`"
+    assert str(caught.value) == f"{message} fewer with `parameter`"
 
 
 def test_the_level_is_inside_the_panel_also_near_an_end():
@@ -321,8 +321,16 @@ def test_levels_without_an_interval_are_refused_by_the_schema(plot, level):
 def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(plot):
     result = plot(common())
     assert result.exit_code == 1
-    assert result.stderr.endswith("; set --wide, or fit again with fewer parameters in --profile\n")
+    assert result.stderr.endswith("; set --wide, or name fewer with --parameter\n")
     assert plot(common(), "--wide").exit_code == 0
+    name = common()[2].name
+    assert plot(common(), "--parameter", name, "--parameter", common()[0].name).exit_code == 0
+    assert [one.name for one in chosen_profiles(common(), [name])] == [name]
+    assert [one.name for one in chosen_profiles(common(), [])] == [one.name for one in common()]
+    with pytest.raises(
+        ArtefactError, match="`parameter`: expected 'sigma_p', found 'mass'; fit again with `profile` for others"
+    ):
+        chosen_profiles(common()[:1], ["mass"])
     assert plot(common()[:2]).exit_code == 0
 
 

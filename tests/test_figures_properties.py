@@ -24,13 +24,38 @@ def values(three):
     return dict(zip((metric.name for metric in PAPER_METRICS), three, strict=True))
 
 
-def bar(label="force, cycle 1", key="force, cycle 1", mean=(6.5, 0.5, 2.0), std=(0.1, 0.2, 0.5), count=12):
-    return PropertyBar(label, key, values(mean), values(std), count)
+def bar(label="force, cycle 1", key="force, cycle 1", mean=(6.5, 0.5, 2.0), std=(0.1, 0.2, 0.5), count=12, half=()):
+    return PropertyBar(label, key, values(mean), values(std), count, values(half) if half else {})
 
 
-def properties(bars, width_in=PAGE_IN):
+def properties(bars, width_in=PAGE_IN, *, as_bars=False):
     figure, axes = new_figure(width_in, height_for(bars, width_in), panels=len(PAPER_METRICS))
-    return figure, draw_properties(axes, bars)
+    return figure, draw_properties(axes, bars, as_bars=as_bars)
+
+
+def ends(lines):
+    return [tuple(np.reshape(segment, (-1, 2))[:, 0]) for segment in lines.get_segments()]
+
+
+def test_points_are_means_with_intervals_and_standard_deviations():
+    bars = [bar(half=(0.05, 0.3, 0.2)), bar("learnt", "learnt", (7.0, 0.4, 2.5), (0.3, 0.1, 0.25), 100)]
+    _, drawn = properties(bars)
+    assert not drawn.bars
+    for panel, mean, std, half in zip(range(3), (6.5, 0.5, 2.0), (0.1, 0.2, 0.5), (0.05, 0.3, 0.2), strict=True):
+        assert drawn.points[panel].get_offsets()[0].tolist() == [mean, 0.0]
+        assert ends(drawn.spreads[panel])[0] == pytest.approx((mean - std, mean + std))
+        assert ends(drawn.intervals[panel])[0] == pytest.approx((mean - half, mean + half))
+        low, high = drawn.axes[panel].get_xlim()
+        assert low <= mean - half < mean + half < high
+    assert [to_hex(colour) for colour in drawn.points[0].get_facecolors()] == ["#56b4e9", "#cc79a7"]
+    assert [axes.get_xlim()[0] > 0 for axes in drawn.axes] == [True, False, True], "0 is shown where it is near"
+
+
+def test_learnt_paths_have_the_interval_of_their_monte_carlo_error():
+    row = GroupMetrics("joystick", LEARNT, 3, values((1, 2, 3)), values((4, 5, 6)), error=values((0.1, 0.2, 0.3)))
+    driven = GroupMetrics("joystick", DRIVEN, 3, values((1, 2, 3)), values((4, 5, 6)), half_interval=values((7, 8, 9)))
+    assert bars_of([row])[0].half == pytest.approx(values((0.196, 0.392, 0.588)), rel=1e-3)
+    assert bars_of([driven])[0].half == values((7, 8, 9))
 
 
 def whiskers(container):
@@ -40,7 +65,8 @@ def whiskers(container):
 
 def test_bars_are_means_from_zero_and_whiskers_standard_deviations():
     bars = [bar(), bar("learnt", "learnt", (7.0, 0.4, 2.5), (0.3, 0.1, 0.25), 100)]
-    _, drawn = properties(bars)
+    figure, drawn = properties(bars, as_bars=True)
+    assert figure.get_supxlabel() == "bars: mean, whiskers: standard deviation"
     for panel, means, stds in zip(
         drawn.bars, [(6.5, 7.0), (0.5, 0.4), (2.0, 2.5)], [(0.1, 0.3), (0.2, 0.1), (0.5, 0.25)], strict=True
     ):
@@ -82,9 +108,9 @@ def test_bars_are_named_by_group_and_type_of_path_and_baselines_have_none():
     assert bars_of(rows, learnt_from={"force"}) == bars[:1]
 
 
-def test_a_note_explains_bars_and_whiskers():
-    figure, _ = properties([bar()], COLUMN_IN)
-    assert figure.get_supxlabel() == "bars: mean, whiskers: standard deviation"
+def test_a_note_explains_points_and_lines():
+    figure, _ = properties([bar()])
+    assert figure.get_supxlabel() == "points: mean, thick lines: its 95 % interval, thin lines: standard deviation"
 
 
 def test_labels_of_narrow_panels_break_once():
@@ -97,19 +123,19 @@ def test_labels_of_narrow_panels_break_once():
 
 
 @pytest.mark.parametrize(("width_in", "mean"), layouts(*zip(WIDTHS, 2 * MEANS, strict=True)))
-def test_an_axis_has_three_ticks_at_least(mean, width_in):
-    _, drawn = properties([bar(mean=mean, std=(0.2, 0.1, 0.1))], width_in)
-    for axes in drawn.axes:
+def test_an_axis_of_bars_has_three_ticks_at_least_and_one_of_points_two(mean, width_in):
+    both = [properties([bar(mean=mean, std=(0.2, 0.1, 0.1))], width_in, as_bars=bars)[1] for bars in (True, False)]
+    for axes, least in [(axes, 3) for axes in both[0].axes] + [(axes, 2) for axes in both[1].axes]:
         low, high = axes.get_xlim()
         at = axes.get_xticks()
-        assert len(at) >= 3
+        assert len(at) >= least
         assert low <= at.min() < at.max() <= high
         texts = [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axes.get_xticklabels()]
         np.testing.assert_allclose([float(text) for text in texts], at)
 
 
 def test_numbers_too_long_for_three_ticks_have_fewer():
-    figure, drawn = properties([bar(mean=(6543210.0, 0.00123, 2.0), std=(1.0, 0.0001, 0.5))], COLUMN_IN)
+    figure, drawn = properties([bar(mean=(6543210.0, 0.00123, 2.0), std=(1.0, 0.0001, 0.5))], COLUMN_IN, as_bars=True)
     assert [len(axes.get_xticks()) for axes in drawn.axes] == [2, 2, 3]
     assert_labels_apart(figure, drawn)
 
@@ -134,8 +160,7 @@ def test_a_mean_that_does_not_exist_is_marked():
     figure, drawn = properties([bar(), bar("alone", "autonomous", (6.0, nan, 0.1), (nan, nan, nan), 1)])
     figure.draw_without_rendering()
     assert [[text.get_text() for text in axes.texts] for axes in drawn.axes] == [[], ["n/a"], []]
-    assert drawn.axes[1].texts[0].xy == (0.0, 1)
-    assert drawn.axes[1].get_xlim()[0] == 0.0
+    assert drawn.axes[1].texts[0].xy == (drawn.axes[1].get_xlim()[0], 1)
 
 
 def test_negative_distances_are_within_the_axis():
@@ -179,6 +204,10 @@ def test_no_bar_is_refused():
         ("force, cycle 2", "#0072B2"),
         ("force, cycle 7", "#00304D"),
         ("joystick, cycle 2", "#D55E00"),
+        ("force, obstacle course", "#544C00"),
+        ("force, cycle 2, obstacle course", "#544C00"),
+        ("force, cycle 2, no people", "#0072B2"),
+        ("force, no cycle, main task", "#0072B2"),
         ("autonomous", "#009E73"),
         ("driven, on grid", "#7A7A7A"),
         ("unknown", "#8C8C8C"),

@@ -81,14 +81,14 @@ def test_no_height_of_rows_of_maps_is_empty_and_their_width_stays(panels):
     ("key", "colour"),
     [
         ("obstacle avoidance", COLOURS["avoidance"]),
-        ("force, obstacle course", COLOURS["force"]),
-        ("force, cycle 1, obstacle course", COLOURS["force, cycle 1"]),
-        ("force, cycle 3, obstacle course", COLOURS["force, later cycles"]),
-        ("joystick, cycle 1, obstacle course", COLOURS["joystick"]),
+        ("force, obstacle course", COLOURS["set 1"]),
+        ("force, cycle 1, obstacle course", COLOURS["set 1"]),
+        ("joystick, cycle 1, obstacle course", COLOURS["set 1"]),
+        ("joystick, corridor", COLOURS["set 3"]),
         ("unknown, obstacle course", "#8C8C8C"),
     ],
 )
-def test_special_sets_have_the_colour_of_their_condition(key, colour):
+def test_special_sets_have_colours_of_their_own(key, colour):
     assert colour_of(key) == colour
 
 

@@ -24,9 +24,13 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
 }
 SLOW = {
+    "report demos.json reward.json --samples 50 -o report.html --force",
+    "simulate -o simulated",
     "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",
+    "watch logs --reward reward.json --participant p04 --condition force -o visit",
+    "watch logs --condition force -o visit --once",
     "study p01.mcap p02.mcap p03.mcap -o study",
 }
 EVERY = [pytest.param(words, command, id=" ".join(words)) for words, command in commands()]
@@ -60,6 +64,8 @@ def folder(tmp_path_factory):
             [*fit, "--profile", "sigma_p", "-o", "reward.json"],
             [*fit, "-o", "first.json"],
             [*fit, "--only-corrected", "-o", "second.json"],
+            ["select", "demos.json", "--participant", "p01", "-o", "monday.json"],
+            ["select", "demos.json", "--participant", "p02", "-o", "tuesday.json"],
         ):
             result = CliRunner().invoke(cli, words)
             assert result.exit_code == 0, result.output
@@ -119,6 +125,8 @@ TABLES = {
     "fit": ["demos.json", "--cycle", "2", "--intervals", "wald", "-o", "new.json"],
     "models": ["demos.json", "--terms", "length", "--condition", "force"],
     "evaluate": ["demos.json"],
+    "info": ["demos.json"],
+    "config": [],
     "plan": ["reward.json", "--scene", "demos.json"],
     "export": ["reward.json", "--to", "table"],
     "import-study": ["runs.tar.gz", "-o", "new"],
@@ -148,6 +156,7 @@ def test_json_is_one_object_with_units_in_its_keys(folder, tmp_path, monkeypatch
 
 #: Objects whose keys are names of the data: participants, groups, modalities, metrics, reasons.
 BY_DATA = {
+    "groups",
     "parameters",
     "reward_by_term",
     "participants",
@@ -176,6 +185,8 @@ def test_examples_run(folder, tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "rerun", fake_rerun())
     words = shlex.split(line)[1:]
+    if words[0] == "watch" and "--once" not in words:
+        words.append("--once")  # it would wait for more
     output = words[words.index("-o") + 1] if "-o" in words else None
     for path in folder.iterdir():
         if path.name != output:

@@ -11,6 +11,7 @@ from navirl_cli.artefacts.store import read_json
 from navirl_cli.documents.sheets import _text
 from navirl_cli.errors import LogError, NavirlError, brief
 from navirl_cli.files import Input, open_regular
+from navirl_cli.irl.terms.registry import _from_file
 from navirl_cli.logs.map_file import read_map
 from navirl_cli.logs.yaml_file import read_mapping
 from navirl_cli.published.archive import files_in
@@ -23,6 +24,7 @@ READERS = {
     "archive": lambda path: files_in(path, lambda _: True),
     "yaml": lambda path: read_mapping(path, "save it again"),
     "map": read_map,
+    "term": lambda path: _from_file(f"{path}:MyTerm"),
 }
 
 
@@ -46,7 +48,7 @@ def test_only_regular_files_are_read(tmp_path, monkeypatch, read):
         (tmp_path / "/dev/zero", "a device"),
         (tmp_path, "a folder"),
     ):
-        with pytest.raises(NavirlError, match=f"expected a regular file, found {found}") as caught:
+        with pytest.raises(NavirlError, match=rf"{found}( \(FIFO\))?, expected a regular file; ") as caught:
             read(path)
         assert "\n" not in str(caught.value)
 
@@ -54,7 +56,7 @@ def test_only_regular_files_are_read(tmp_path, monkeypatch, read):
 def test_the_picture_of_a_map_is_a_regular_file(tmp_path):
     fifo(tmp_path / "m.pgm")
     (tmp_path / "m.yaml").write_text(f"image: m.pgm\n{HEAD}")
-    with pytest.raises(LogError, match="expected a regular file, found a pipe"):
+    with pytest.raises(LogError, match=r"a pipe \(FIFO\), expected a regular file; save its bytes to a file first"):
         read_map(tmp_path / "m.yaml")
 
 
@@ -89,7 +91,7 @@ def test_a_value_is_never_written_out_whole_in_a_message():
     deep = []
     for _ in range(100_000):
         deep = [deep]
-    values = (shared, {"a": shared}, deep, "x" * 10_000_000, 10**10_000)
+    values = (shared, {"a": shared}, (shared,), {("x",) * 9}, deep, "x" * 10_000_000, 10**10_000)
     tracemalloc.start()
     for value in values:
         assert len(brief(value)) <= 60
@@ -97,7 +99,7 @@ def test_a_value_is_never_written_out_whole_in_a_message():
     tracemalloc.stop()
 
 
-@pytest.mark.parametrize("value", [[1, "a"], {"a": [1.5, None], 2: {}}, "it's", b"x", [], (1, 2), True])
+@pytest.mark.parametrize("value", [[1, "a"], {"a": [1.5, None], 2: {}}, "it's", b"x", [], (1, 2), (1,), {1, 2}, True])
 def test_a_short_value_is_shown_as_python_writes_it(value):
     assert brief(value) == repr(value)
 

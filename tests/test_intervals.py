@@ -63,7 +63,7 @@ def test_an_end_takes_few_evaluations_of_the_likelihood(evidence, found, monkeyp
     monkeypatch.setattr(module, "Objective", Counted)
     intervals(evidence, found, Kind.PROFILE)
     begun = made[0].evaluations
-    intervals(evidence, replace(found, scanned=found.scanned[:0]), Kind.PROFILE)
+    intervals(evidence, replace(found, scanned=()), Kind.PROFILE)
     assert len(found.scanned) > 8
     assert begun < made[1].evaluations < 40, "8 ends, and the profile; the scan of the fit spares a part"
 

@@ -48,7 +48,21 @@ WITHOUT = {
         "stopped_early",
     ),
     *("identified_draws", "counts", "median", "cells_equal", "theta_participants"),
-    *("precision", "rank", "rank_biserial", "cohen_dz", "wilcoxon_p", "p_value", "statistic", "level", "l2"),
+    *(
+        "precision",
+        "rank",
+        "distance_rank",
+        "area_rank",
+        "not_ranked",
+        "rank_biserial",
+        "cohen_dz",
+        "wilcoxon_p",
+        "holm_p",
+        "p_value",
+        "statistic",
+        "level",
+        "l2",
+    ),
     *("condition_number", "mismatch_standard_errors", "parameter_count"),
     # how people are scattered: of logarithms
     *("log_mean", "log_covariance", "scatter", "scatter_lower", "scatter_upper", "scatter_rms"),
@@ -158,7 +172,7 @@ def test_numbers_of_metrics_have_their_unit_in_their_name():
     units = {"1": "", "1/m": "1_m", "m²": "m2", "m/s": "m_s", "m/s²": "m_s2", "m/s³": "m_s3", "N s": "n_s"}
     for metric in METRICS:
         unit = units.get(metric.unit, metric.unit.lower())
-        assert metric.name.endswith(f"_{unit}" if unit else ("_share", "compliance")), metric.name
+        assert metric.name.endswith(f"_{unit}" if unit else ("_share", "compliance", "_intrusions")), metric.name
 
 
 def test_numbers_of_what_commands_print_have_their_unit_in_their_key(navirl, tmp_path):

@@ -23,7 +23,7 @@ ORDERS = {
         ["artefacts", "export"],
         ["reports"],
         ["figures"],
-        ["api"],
+        ["api", "watching"],
         ["commands"],
         ["cli"],
         ["__main__"],

@@ -234,7 +234,7 @@ REMEDY = "; correct it, or save the map again with map_saver_cli"
         ({"mode": "ternary"}, "key mode: expected trinary, scale or raw, found 'ternary';"),
         ({"mode": "[raw]"}, "key mode: expected trinary, scale or raw, found ['raw'];"),
         ({"image": "none.png"}, "key image: expected a pgm, png or bmp file, found no file {folder}/none.png; put"),
-        ({"image": "."}, "found at {folder}: expected a regular file, found a folder;"),
+        ({"image": "."}, "found at {folder}: a folder, expected a regular file;"),
         ({"image": '"a\\0b"'}, "one that does not decode ('embedded null byte')"),
         ({"image": "text.png"}, "found something else at {folder}/text.png" + REMEDY),
         ({"image": "photo.jpg"}, "found something else at {folder}/photo.jpg" + REMEDY),

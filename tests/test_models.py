@@ -10,10 +10,12 @@ import factories as make
 import numpy as np
 import pytest
 import study_data
+from executors import Here
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.demos.subset import Subset
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import PAPER_L2, fit
@@ -27,13 +29,6 @@ from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
 LENGTH, SPACE = (tuple(TERMS[name] for name in names) for names in (("length",), ("length", "personal-space")))
-
-
-class Here:
-    """An executor that runs everything where it stands."""
-
-    def map(self, function, items):
-        return map(function, items)
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +187,7 @@ def study(tmp_path_factory):
         for one in extract(load_recording(path, LoadOptions(forces=Forces.IGNORED)), ExtractSettings()).demonstrations
         if one.set is None
     ]
-    force, joystick = select(found, conditions=("force",), cycle=2), select(found, conditions=("joystick",))
+    force, joystick = select(found, Subset(("force",), (2,))), select(found, Subset(("joystick",)))
     return {"force": force.evidence, "joystick": joystick.evidence}
 
 

@@ -8,8 +8,8 @@ import pytest
 from path_values import drive_values
 from scipy.signal import savgol_filter
 
-from navirl_cli.demos.demonstration import Contact
-from navirl_cli.evaluation.motion import RATE_HZ, WINDOW, derivatives
+from navirl_cli.demos.demonstration import Contact, PersonTrack
+from navirl_cli.evaluation.motion import RATE_HZ, WINDOW, derivatives, touching_s
 
 GRID = make.open_grid(60, 30, (-3.0, -1.5))
 
@@ -121,3 +121,34 @@ def test_without_a_push_forces_are_zero_and_without_a_wrench_unknown():
     found, missing = drive_values(replace(d, contacts=None, force_n=None))
     assert np.isnan([found[name] for name in CONTACT]).all()
     assert [missing[name] for name in CONTACT] == ["no wrench in the log"] * 4
+
+
+def test_time_to_collision_of_discs_that_keep_their_velocity():
+    apart, towards = np.array([[3.0, 0.0]] * 4), np.array([[-0.5, 0.0], [0.5, 0.0], [-0.5, 0.2], [0.0, 0.0]])
+    assert touching_s(apart, towards, 0.5) == pytest.approx([5.0, np.inf, np.inf, np.inf])
+    assert touching_s(np.array([[0.3, 0.3]]), np.array([[1.0, 0.0]]), 0.5) == pytest.approx([0.0])
+    # a slow twin: step until they touch
+    rng = np.random.default_rng(1)
+    p, v = rng.uniform(-3, 3, (50, 2)), rng.uniform(-1, 1, (50, 2))
+    t = np.linspace(0, 20, 20001)
+    for place, velocity, found in zip(p, v, touching_s(p, v, 0.5), strict=True):
+        near = np.hypot(*(place[:, None] + velocity[:, None] * t)) <= 0.5
+        stepped = t[near.argmax()] if near.any() else np.inf
+        assert found == pytest.approx(stepped, abs=2e-3) or (found > 20 and np.isinf(stepped))
+
+
+def test_a_drive_towards_a_person_and_a_stop():
+    t = np.linspace(0, 10, 301)
+    x = np.minimum(0.4 * t, 2.0)  # stops after 5 s, 1 m before the person
+    found = values(moving(np.stack([x, 0 * t], axis=1), t, people=[[3.0, 0.0]]))
+    assert found["not_moving_s"] == pytest.approx(5.0, abs=0.4)
+    assert (found["personal_intrusions"], found["intimate_intrusions"]) == (1, 0)
+    assert found["time_to_collision_s"] == pytest.approx((1.0 - 0.25 - 0.25) / 0.4, abs=0.4)
+    assert found["personal_time_share"] == pytest.approx(found["personal_s"] / 10)
+    away = values(moving(np.stack([-0.4 * t, 0 * t], axis=1), t, people=[[3.0, 0.0]]))
+    assert np.isnan(away["time_to_collision_s"])
+    # a person who walks towards the robot with the same speed halves the time
+    track = PersonTrack("p", t, np.stack([3.0 - 0.1 * t, 0 * t], axis=1))
+    made = moving(np.stack([0.1 * t, 0 * t], axis=1), t, people=[[2.5, 0.0]])
+    found = values(replace(made, tracks=(track,)))
+    assert found["time_to_collision_s"] == pytest.approx((1.0 - 0.25 - 0.25) / 0.2, abs=0.01)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from navirl_cli.evaluation.paired import FEWEST, paired
+from navirl_cli.evaluation.paired import FEWEST, holm, paired
 
 
 def compare(differences, seed=0):
@@ -76,3 +76,16 @@ def test_the_same_seed_gives_the_same_interval():
     values = np.random.default_rng(2).normal(size=9)
     assert compare(values, 3) == compare(values, 3)
     assert compare(values, 3).bootstrap != compare(values, 4).bootstrap
+
+
+def test_holms_correction_is_its_slow_twin():
+    rng = np.random.default_rng(4)
+    p = rng.uniform(0, 0.2, 12)
+    p[3] = np.nan
+    known = sorted((value, place) for place, value in enumerate(p) if np.isfinite(value))
+    expected, least = np.full(12, np.nan), 0.0
+    for number, (value, place) in enumerate(known):
+        least = max(least, min(1.0, value * (len(known) - number)))
+        expected[place] = least
+    assert holm(p) == pytest.approx(expected, nan_ok=True)
+    assert holm(np.array([0.01, 0.04, 0.03])) == pytest.approx([0.03, 0.06, 0.06])

@@ -8,7 +8,7 @@ import pytest
 
 from navirl_cli.demos.grid import MOVES, Grid
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.evaluation.segments import Segments
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.terms import TERMS

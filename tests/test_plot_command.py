@@ -8,20 +8,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from figure_factory import demonstration
+from figure_factory import demonstration, one_axes, scene
 from PIL import Image
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.rewards import reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.plot import FIGURES, plot
-from navirl_cli.commands.plot.page import FORMATS, STYLES
+from navirl_cli.commands.plot.page import FONTS, FORMATS, STYLES
 from navirl_cli.demos.demonstration import Condition
-from navirl_cli.figures import sheet
+from navirl_cli.figures import sheet, style
+from navirl_cli.figures.cells import draw_policy
 from navirl_cli.figures.style import LOOKS
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
+
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -227,3 +230,64 @@ def test_what_cannot_be_compared_is_refused(navirl, files):
     both = ("--group", "joystick", "--group", "force, cycle 1", "--trial", "p01/1")
     assert "--trial selects the scene of --reward" in navirl(*words, *both, code=2).stderr
     assert "found 'x'" in navirl(*words, "--group", "x", "--group", "y", code=1).stderr
+
+
+def test_options_that_would_change_nothing_are_refused(navirl, files):
+    learnt = (files / "demos.json", "--reward", files / "reward.json", "-o", "a.png")
+    for option in ("--samples", "--seed"):
+        answer = navirl("plot", "policy", *learnt, "--overlay", "demos", option, "3", code=2).stderr
+        assert f"Error: {option} goes with --overlay samples." in answer
+        answer = navirl("plot", "properties", files / "demos.json", "-o", "a.png", option, "3", code=2).stderr
+        assert f"Error: {option} goes with --reward." in answer
+
+
+def test_properties_can_be_bars_and_letters_those_of_ieee(files, figure_of):
+    words = ("properties", files / "demos.json")
+    assert not figure_of(*words).axes[0].containers
+    figure = figure_of(*words, "--bars", "--font", "times")
+    assert len(figure.axes[0].patches) == 2
+    assert figure.axes[0].xaxis.label.get_fontname() == "STIXGeneral"
+
+
+def test_more_than_forty_paths_have_a_map_for_each_group(figure_of):
+    ones = [
+        replace(demonstration(condition, cycle, 0.02 * n), id=f"p01/{condition}{cycle}{n}")
+        for condition, cycle in ((Condition.FORCE, 1), (Condition.FORCE, 2), (Condition.JOYSTICK, None))
+        for n in range(14)
+    ]
+    write_json(Path("many.json"), "demonstrations", demonstrations_document(ones, [], {}), force=False)
+    figure = figure_of("paths", "many.json")
+    assert [panel.get_title().replace("\N{NO-BREAK SPACE}", " ").replace("\n", " ") for panel in figure.axes[:3]] == [
+        "force, cycle 1 (n = 14)",
+        "force, cycle 2 (n = 14)",
+        "joystick (n = 14)",
+    ]
+    assert not [text for text in entries(figure) if "force" in text], "titles name the groups"
+    (alone,) = figure_of("paths", "many.json", "--together").axes
+    paths = [line for line in alone.lines if len(line.get_xdata()) > 50]
+    assert len(paths) == 42
+    assert max(line.get_linewidth() for line in paths) < 0.5
+    assert "force, cycle 1 (n = 14)" in entries(alone.figure)
+
+
+def test_fonts_are_those_of_the_styles():
+    assert list(FONTS) == list(style.FONTS)
+
+
+def test_the_example_in_front_is_made_by_the_command_that_it_shows():
+    command = next(line for line in (ROOT / "README.md").read_text().splitlines() if "navirl plot policy" in line)
+    assert "--crop --overlay all --wide" in command
+    demo = (ROOT / "sample_logs" / "demo.sh").read_text().replace("demo/policy", "policy")
+    assert command.split("--trial")[1] in demo
+    with Image.open(ROOT / "docs" / "policy.png") as image:
+        assert image.size[0] == 2148, "a page wide, at 300 dpi"
+        colours = {image.convert("RGB").getpixel((x, image.size[1] // 2)) for x in range(0, 2148, 4)}
+    assert len(colours) > 20
+
+
+def test_people_are_filled_where_that_hides_no_visits():
+    a_scene = scene()
+    near = np.hypot(*(a_scene.lattice.xy_m - a_scene.people_m[0]).T) < 0.25
+    for visits, filled in ((np.where(near, 0.0, 0.01), True), (np.full(a_scene.lattice.size, 0.01), False)):
+        marks = draw_policy(one_axes(), a_scene, visits).marks
+        assert marks.discs is filled

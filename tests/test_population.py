@@ -13,19 +13,14 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.newcomer import Others, newcomer
 from navirl_cli.irl.population import population
-from navirl_cli.irl.random_effects import Spread
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.status import Status
+from navirl_cli.parallel import Local
 
 TRUTH = np.array([-40.0, -2.0, -5.0, 2.0])
 SCATTER = 0.25
-
-
-class Here:
-    """An executor of this thread."""
-
-    map = staticmethod(map)
 
 
 def people(count, each=2, seed=1):
@@ -46,7 +41,7 @@ def people(count, each=2, seed=1):
 def found():
     evidence = evidence_of(people(6))
     pooled = fit(evidence, Reward.named({}))
-    return evidence, pooled, *population(evidence, pooled, executor=Here())
+    return evidence, pooled, *population(evidence, pooled, executor=Local(1))
 
 
 def test_population_has_a_typical_reward_and_one_for_each_person(found):
@@ -81,9 +76,9 @@ def test_a_newcomer_without_scatter_is_the_typical_person(found):
     evidence, _, typical, known, _ = found
     _, own = evidence.apart("p3")
     none = Others(known.scale, Spread(known.mean, np.full(4, 1e-4)))
-    alike, _ = newcomer(own, none, "new")
-    assert np.allclose(alike.reward.theta, typical.reward.theta, rtol=1e-3)
     wide = Others(known.scale, Spread(known.mean, np.sqrt(np.diag(known.prediction()))))
+    alike, _ = newcomer(own, none, "new", fit(own, typical.reward, prior=none.prior()))
+    assert np.allclose(alike.reward.theta, typical.reward.theta, rtol=1e-3)
     fitted, ends = newcomer(own, wide, "new")
     assert fitted.log_likelihood > alike.log_likelihood
     assert all(one.lower < value < one.upper for one, value in zip(ends.ends, fitted.reward.theta, strict=True))

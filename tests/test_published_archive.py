@@ -93,6 +93,16 @@ def test_a_member_that_claims_gigabytes_is_refused(path):
         runs_in(path)
 
 
+def test_an_archive_unpacks_in_proportion_to_its_size(path, monkeypatch):
+    monkeypatch.setattr(archive, "FREE_BYTES", 1 << 20)
+    path.write_bytes(forge.archive(FILES | {f"runs/{i}/junk": bytes(1 << 20) for i in range(4)}))
+    assert path.stat().st_size < 10_000
+    with refused(path, "more than 1 MB unpacked"):
+        runs_in(path)
+    monkeypatch.setenv("NAVIRL_NO_LIMITS", "1")
+    assert runs_in(path)[0]
+
+
 def test_an_archive_that_unpacks_to_more_than_a_gigabyte_is_refused(path, monkeypatch):
     monkeypatch.setattr(archive, "MOST_IN_ALL", 4 << 20)
     path.write_bytes(forge.archive(FILES | {f"runs/{i}/junk": bytes(1 << 20) for i in range(4)}))

@@ -104,7 +104,7 @@ def test_links_into_nowhere_and_pipes_in_a_folder_are_listed_beside_a_good_log(t
     assert len(found.demonstrations()) == 7
     assert len(found.lost) == 2
     assert "gone.mcap: expected an MCAP file, found no file there" in found.lost[0]
-    assert "pipe.mcap: expected an MCAP file, found a pipe or a device" in found.lost[1]
+    assert "pipe.mcap: expected an MCAP file, found a pipe (FIFO), expected a regular file" in found.lost[1]
 
 
 def test_an_unexpected_error_in_one_log_is_its_own_and_named(tmp_path, monkeypatch):

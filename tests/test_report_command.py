@@ -3,16 +3,21 @@
 import json
 import re
 from base64 import b64decode
+from dataclasses import asdict, replace
 from math import inf
 from pathlib import Path
 
 import pytest
 from browser import CHROMIUM, Browser
 from click.testing import CliRunner
+from figure_factory import demonstration
 
 from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.cli import cli
+from navirl_cli.demos.demonstration import Condition
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.evaluation.meaning import half_distance_m
+from navirl_cli.reports.made import changed_settings, selection_words
 from navirl_cli.reports.reward import in_words
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
@@ -24,7 +29,16 @@ def work(tmp_path_factory):
     for words in (
         ["extract", *LOGS, "-o", folder / "demos.json"],
         ["fit", folder / "demos.json", "--cycle", 2, "--profile", "c0", "-o", folder / "reward.json"],
-        ["report", folder / "demos.json", folder / "reward.json", "-o", folder / "page.html", "--samples", 100],
+        [
+            "report",
+            folder / "demos.json",
+            folder / "reward.json",
+            "-o",
+            folder / "page.html",
+            "--samples",
+            100,
+            "--all",
+        ],
     ):
         result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
         assert result.exit_code == 0, result.output
@@ -56,7 +70,10 @@ def test_it_says_in_front_how_to_drive(page):
 
 
 def test_it_holds_figures_trials_ranks_and_hashes(work, page):
-    assert page.count("data:image/png;base64,") == 4  # paths, policy, properties, profile
+    assert (
+        page.count("data:image/png;base64,") == 10
+    )  # paths, policy wide and narrow, properties, profile; each in the dark
+    assert page.count("<picture>") == 4
     for number in range(1, 8):
         assert f"p01/{number}" in page
     document = json.loads((work / "demos.json").read_text())
@@ -64,6 +81,43 @@ def test_it_holds_figures_trials_ranks_and_hashes(work, page):
     assert "Ranks of demonstrations among the policy" in page
     assert "Not ranked, because the reward was not learnt from such trials: force, cycle 1 (2), joystick (2), " in page
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
+
+
+def test_it_says_how_it_was_made(page):
+    made = page[page.index("How it was made</h2>") :].replace("<wbr>", "")
+    assert "<li>Learnt from 2 of 7 demonstrations: p01/3, p01/4.</li>" in made
+    assert "<li>Steps: all (" in made
+    assert (
+        "; method newton; regulariser 0.001; without a prior; start: c0 -50, a_g -0.01, a_p -5, sigma_p 2.</li>" in made
+    )
+    for command in (
+        "navirl extract p01.mcap -o demos.json",
+        "navirl fit demos.json --cycle 2 -o reward.json",
+        "navirl report demos.json reward.json --all --samples 100 --seed 0 -o report.html",
+    ):
+        assert f"<code>{command}</code>" in made
+
+
+def test_demonstrations_are_chosen_by_the_options_that_give_the_same():
+    force, again, joystick = (
+        demonstration(Condition.FORCE, 1, 0.1),
+        demonstration(Condition.FORCE, 2, 0.2),
+        demonstration(Condition.JOYSTICK, 2, 0.3),
+    )
+    everyone = [force, again, joystick]
+    assert selection_words(everyone, everyone) == []
+    assert selection_words(everyone, [force, again]) == ["--condition", "force"]
+    assert selection_words(everyone, [again]) == ["--condition", "force", "--cycle", "2"]
+    assert selection_words(everyone, [again, joystick]) == ["--cycle", "2"]
+    assert selection_words(everyone, [force, joystick]) == ["--trial", force.id, "--trial", joystick.id]
+    course = replace(again, id="p01/9", set="obstacle course")
+    assert selection_words([*everyone, course], [again])[-2:] == ["--set", "main task"]
+
+
+def test_settings_other_than_the_defaults_are_named():
+    defaults = asdict(ExtractSettings())
+    written = {**defaults, "push": {**defaults["push"], "begins_n": 9.5}, "time": "receipt", "map": None}
+    assert changed_settings(written, defaults) == {"begins_n": 9.5, "time": "receipt"}
 
 
 def test_it_warns_of_starts_aside(work):

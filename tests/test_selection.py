@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from navirl_cli.demos.demonstration import Condition, Contact
+from navirl_cli.demos.subset import Subset
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.selection import Steps, common_resolution_m, select
 
@@ -29,8 +30,8 @@ ALL = (PUSHED, LEFT_ALONE, STICK)
     ("choice", "expected"),
     [
         ({}, ALL),
-        ({"conditions": ["force"]}, (PUSHED, LEFT_ALONE)),
-        ({"conditions": ["force", "joystick"], "cycle": 2}, (PUSHED, STICK)),
+        ({"subset": Subset(("force",))}, (PUSHED, LEFT_ALONE)),
+        ({"subset": Subset(("force", "joystick"), (2,))}, (PUSHED, STICK)),
         ({"only_corrected": True}, (PUSHED, STICK)),
         ({"steps": Steps.CONTACT}, (PUSHED,)),
     ],
@@ -57,11 +58,11 @@ def test_an_unknown_intervention_is_not_treated_as_no_intervention():
 
 def test_an_empty_selection_is_refused():
     with pytest.raises(DemonstrationError, match=r"^`cycle`: expected one of 'cycle 1', .*found 'cycle 7'"):
-        select(ALL, cycle=7)
+        select(ALL, Subset(("force",), (7,)))
     with pytest.raises(
-        DemonstrationError, match=r"^`condition` and `cycle`: expected one of 'f.* found 'force, cycle 7'"
+        DemonstrationError, match=r"^`condition` and `cycle`: expected one of 'f.* found 'joystick, cycle 1'"
     ):
-        select(ALL, conditions=["force"], cycle=7, steps=Steps.CONTACT)
+        select(ALL, Subset(("joystick",), (1,)), steps=Steps.CONTACT)
     with pytest.raises(DemonstrationError, match=r"^`only_corrected`: the person intervened in none of the demonstr"):
         select([LEFT_ALONE], only_corrected=True)
     with pytest.raises(DemonstrationError, match=r"^no demonstration to learn from"):

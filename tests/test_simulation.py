@@ -5,7 +5,15 @@ import pytest
 from mcap.reader import make_reader
 from truth import read_record, read_truth
 
+from navirl_cli.artefacts.plans import Planned, plan_document, read_line, write_plan
+from navirl_cli.demos.extract import ExtractSettings, extract
+from navirl_cli.errors import ArtefactError, SceneError
+from navirl_cli.evaluation.lines import Lines
 from navirl_cli.irl.reward import Reward
+from navirl_cli.logs.load import load_recording
+from navirl_cli.planning.paths import Mode, Planner
+from navirl_cli.planning.problem import problem_of
+from navirl_cli.planning.smooth import Limits, smoothed
 from navirl_cli.simulation import person, protocol, sensors
 from navirl_cli.simulation.behaviour import Behaviour, Displeasure, Joystick
 from navirl_cli.simulation.driving import FORWARD_M_S, GAIN_S_KG, SIDEWAYS_M_S, STEP_S, Path, drive
@@ -78,6 +86,64 @@ def test_passes_stay_on_free_cells_and_arrive(written):
         cells = session.hallway.free.cells_of(one.drive.xy_m)
         assert not session.hallway.free.is_occupied(cells).any()
         assert np.hypot(*(one.drive.xy_m[-1] - one.plan.xy_m[-1])) < 0.3
+
+
+def test_evaluate_finds_a_driven_path_where_it_was_planned(written, tmp_path):
+    path, session = written
+    (demonstration,) = (one for one in demonstrations_of(path) if one.id == "p01/3")
+    planner = Planner(problem_of(demonstration), Reward(person.PUBLISHED))
+    planned = planner.plan(Mode.EXPECTED)[0]
+    smooth = smoothed(planner.problem, planned.line_m, 0.1, Limits())
+    line = smooth.xy_m
+    document = plan_document(planner, [Planned(planned, smooth)], Mode.EXPECTED, 0, [])
+    for ending in (".csv", ".json"):
+        write_plan(tmp_path / f"path{ending}", document, force=False)
+        np.testing.assert_allclose(read_line(tmp_path / f"path{ending}"), line, atol=1e-6)
+    driven = write_log(1, 5, tmp_path / "p01.mcap", driven_m=line, force=False)
+    assert np.array_equal(driven.hallway.person_m, session.hallway.person_m)
+    first, second, alone = demonstrations_of(tmp_path / "p01.mcap")
+    assert [one.condition.value for one in (first, second, alone)] == ["force", "force", "autonomous"]
+    assert (first.cycle, alone.cycle) == (2, None)
+    assert not alone.corrected
+    # localisation errs by some centimetres
+    away = np.hypot(*(alone.xy_m[:, None] - line).transpose(2, 0, 1)).min(axis=1)
+    assert away.max() < 0.12
+    least = [
+        float(Lines(one[None], planner.problem.nominal_m, demonstration.people_m, 0.3).min_distance_m[0])
+        for one in (line, alone.xy_m)
+    ]
+    assert least[1] == pytest.approx(least[0], abs=0.04)
+
+
+def demonstrations_of(path):
+    return extract(load_recording(path), ExtractSettings()).demonstrations
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ([(-3.0, 0.0), (9.0, 0.0)], r"in an obstacle or outside; plan it on the map of a simulated log"),
+        ([(-3.0, 0.05), (3.0, 0.05)], r"around the simulated person at .* touches them"),
+    ],
+)
+def test_a_path_that_the_robot_cannot_drive_is_refused(line, message):
+    with pytest.raises(SceneError, match=message):
+        protocol.session(1, 5, driven_m=np.array(line))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x,y\n1,2\n", "expected a CSV table with numbers under x_m and y_m"),
+        ("x_m,y_m\n1,two\n", "expected a CSV table with numbers"),
+        ("x_m,y_m\n1,2\n1,2\n", "expected a path of at least 0.5 m, found 2 points"),
+        ("", "expected a path of at least 0.5 m, found 0 points"),
+    ],
+)
+def test_what_is_no_path_is_refused(tmp_path, text, message):
+    (tmp_path / "path.csv").write_text(text)
+    with pytest.raises(ArtefactError, match=message):
+        read_line(tmp_path / "path.csv")
 
 
 def test_driving_follows_equation_1():

@@ -79,7 +79,8 @@ def test_a_folder_and_a_missing_file(tmp_path):
 
 def test_a_pipe_is_refused_before_it_blocks(tmp_path):
     os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(LogError, match=r"pipe.mcap: expected an MCAP file, found a pipe or a device; save its bytes"):
+    found = r"a pipe \(FIFO\), expected a regular file; save its bytes"
+    with pytest.raises(LogError, match=f"pipe.mcap: expected an MCAP file, found {found}"):
         check_path(tmp_path / "pipe.mcap")
 
 

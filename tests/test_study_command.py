@@ -131,6 +131,13 @@ def test_the_report_shows_every_figure(written):
 
 
 @pytest.mark.slow
+def test_without_a_terminal_each_fit_has_a_line(written):
+    lines = [line for line in written[1].stderr.splitlines() if line.startswith("navirl: fit ")]
+    assert lines[0].startswith("navirl: fit 1 of ")
+    assert lines[-1].endswith(f"{len(lines)} of {len(lines)}: all")
+
+
+@pytest.mark.slow
 def test_the_same_seed_writes_the_same_bytes(written, tmp_path):
     out, _ = written
     words = [

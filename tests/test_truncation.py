@@ -178,7 +178,7 @@ def test_fit_leaves_truncated_trials_out_unless_asked():
 
 def test_a_study_leaves_truncated_trials_of_a_file_out(tmp_path):
     write_json(tmp_path / "d.json", "demonstrations", demonstrations_document([of("a/1"), CUT], [], {}), force=False)
-    given = _given([tmp_path / "d.json"], LoadOptions())
+    given = _given([tmp_path / "d.json"], LoadOptions(), None)
     assert [one.id for one in given.demonstrations] == ["a/1"]
     assert given.lost == ["left out: a/2 is cut off"]
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import factories as make
 import numpy as np
 import pytest
+from executors import Here
 from toy_term import Egg
 
 from navirl_cli.errors import DemonstrationError
@@ -20,13 +21,6 @@ SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -0.8, -4.0, 3.0))
 START = Reward.named({})
 MODELS = {"learnt": (0, 1, 2), "length + personal space": (0, 2), "no person": (0, 1), "length only": (0,)}
-
-
-class Here:
-    """An executor that runs everything where it stands."""
-
-    def map(self, function, items):
-        return map(function, items)
 
 
 def mixed(reward, participants, each, seed):

@@ -7,6 +7,8 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from navirl_cli.demos.demonstration import Condition
+from navirl_cli.demos.subset import Subset
 from navirl_cli.errors import ArgumentError, unknown
 from navirl_cli.irl.terms.registry import terms_named
 from navirl_cli.irl.terms.term import Term
@@ -90,3 +92,20 @@ def terms_in(given: str | Sequence[str | Term]) -> tuple[Term, ...]:
     """
     words = [word.strip() for word in given.split(",")] if isinstance(given, str) else list(given)
     return terms_named(words) if words else ()
+
+
+def subset_in(
+    condition: str | Collection[str],
+    cycle: int | Collection[int],
+    set: str | Collection[str],  # noqa: A002 the option's name
+    participant: str | Collection[str],
+    trial: str | Collection[str],
+) -> Subset:
+    """The demonstrations that are meant: one name of each field or several; none for all.
+
+    Raises:
+        ArgumentError: A condition does not exist.
+    """
+    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    cycles = (cycle,) if isinstance(cycle, int) else tuple(cycle)
+    return Subset(conditions, cycles, texts(set), texts(participant), texts(trial))

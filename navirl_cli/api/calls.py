@@ -9,13 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from navirl_cli.api.arguments import Point, chosen, one_of, pairs_in, points_in, terms_in, texts, topics_in, within
+from navirl_cli.api.arguments import (
+    Point,
+    chosen,
+    one_of,
+    pairs_in,
+    points_in,
+    subset_in,
+    terms_in,
+    texts,
+    topics_in,
+    within,
+)
 from navirl_cli.api.given import (
     AnyReward,
     PathLike,
     demonstrations_in,
     files_behind,
     learnt_in,
+    of_one,
+    prior_in,
     reward_in,
     sources_behind,
 )
@@ -27,6 +40,7 @@ from navirl_cli.artefacts.demonstrations import (
     settings_document,
 )
 from navirl_cli.artefacts.metrics import metrics_document
+from navirl_cli.artefacts.persons import whose
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
 from navirl_cli.cluster import workers_of
 from navirl_cli.demos.contact import PushSettings
@@ -35,14 +49,13 @@ from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
-from navirl_cli.evaluation.compare import LEARNT, compare
+from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.drawn import MOST, Precision
-from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
+from navirl_cli.evaluation.questions import answers_to, asked_of
 from navirl_cli.evaluation.reach import reach_effect
 from navirl_cli.files import Input
 from navirl_cli.irl.analyses import Pool, Questions, answers
@@ -52,7 +65,7 @@ from navirl_cli.irl.intervals import ASKED, Kind
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.scene import scenes_of
-from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.logs.load import Forces, LoadOptions
@@ -66,6 +79,7 @@ from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
+from navirl_cli.reports.per_trial import write_per_trial
 
 
 def extract(
@@ -245,11 +259,15 @@ def fit(
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
     prior: PathLike | LearntReward | None = None,
+    person: str | None = None,
     pool: str = "all",
     l2: float = PAPER_L2,
     method: str = "newton",
     condition: str | Collection[str] = (),
-    cycle: int | None = None,
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
     only_corrected: bool = False,
     truncated: bool = False,
     steps: str = "all",
@@ -275,13 +293,19 @@ def fit(
         init: Initial values: a reward, its file, or values by name.
         prior: An earlier fit, or its file, as a Gaussian prior with its mean and covariance; without init also the
             initial values.
+        person: Learn the reward of this participant from the own demonstrations and the prior, a reward fitted with
+            ``pool="persons"``. The prior of a new person is how people are scattered, that of a known one the own
+            reward.
         pool: "all": one reward for all participants; "persons": a typical one, and one for each person (random effects
             on the logarithms of the parameters).
         l2: Weight of the regulariser, nats: l2/2 times the sum of squares of the parameters, those per metre in units
             of 10 /m, without the parameters that the prior determines. 0 for none.
         method: "newton" (trust region, and scans for other maxima) or the paper's gradient ascent, "adam".
-        condition: Use trials of these conditions only: "force", "joystick", "autonomous"; one or several.
-        cycle: Use trials of this cycle only.
+        condition: Only trials of these conditions: "force", "joystick", "autonomous"; one or several.
+        cycle: Only trials of these cycles; one or several.
+        set: Only trials of these sets; "main task" are those of none.
+        participant: Only trials of these participants.
+        trial: Only these trials, by their ids.
         only_corrected: Use only trials in which the person intervened.
         truncated: Also use trials that are cut off.
         steps: Use "all" steps of a path, those during "contact", or those in contact or within the person's reach
@@ -320,22 +344,22 @@ def fit(
         seed,
         None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
         chosen(Pool, pool, "pool"),
+        person,
     )
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
     demos = demonstrations_in(demos)
-    conditions = tuple(chosen(Condition, one, "condition").value for one in texts(condition))
+    subset = subset_in(condition, cycle, set, participant, trial)
     reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
-        demos,
-        conditions=conditions,
-        cycle=cycle,
+        of_participant(demos, person),
+        subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=which,
         reach_m=reach_m,
     )
-    earlier = None if prior is None else learnt_in(prior)
+    earlier = None if prior is None else prior_in(prior, person)
     if earlier is not None:
         check_cells(earlier, selected.demonstrations, "prior")
     given = init if init is None or isinstance(init, Mapping) else reward_in(init)
@@ -345,20 +369,25 @@ def fit(
         selected.evidence,
         start,
         weight,
-        prior=None if earlier is None else earlier.as_prior(),
+        prior=None if earlier is None else earlier.as_prior(person),
         method=chosen(Method, method, "method"),
     )
     effect = reach_effect(selected.demonstrations, found, which, reach_m)
     with _executor(executor, workers, cluster) as where:
         whole = which is Steps.ALL
-        found, analyses, lost = answers(selected.evidence, found, questions, whole_paths=whole, executor=where)
+        others = None if earlier is None else earlier.others
+        found, analyses, lost = answers(
+            selected.evidence, found, questions, others=others, whole_paths=whole, executor=where
+        )
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
     )
+    if person is not None and earlier is not None:
+        document |= whose(person, earlier.participants)
     notes = (
         *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=conditions, everyone=demos),
+        *remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos),
         *reach_unused(document, reach_m),
         *fit_warnings(document),
     )
@@ -371,13 +400,22 @@ def fit(
 
 
 def evaluate(
-    demos: PathLike | Sequence[Demonstration],
+    demos: PathLike | Sequence[Demonstration] | Mapping[str, PathLike | Sequence[Demonstration]],
     reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
     *,
+    person: str | None = None,
     metrics: str | Sequence[str] = (),
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     by: str | Collection[str] = (),
     pair: tuple[str, str] | Sequence[tuple[str, str]] = (),
     ranks: bool = False,
+    quantiles: float | Sequence[float] = (),
+    per_trial: PathLike | None = None,
     samples: int = 1000,
     precision: float | None = None,
     seed: int = 0,
@@ -385,13 +423,23 @@ def evaluate(
     """Measure demonstrated, learnt and baseline paths, as ``navirl evaluate``.
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their file; or several by name, whose groups of the same name are compared.
         reward: A reward, its file, values by name of parameter; or several rewards by name.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         metrics: Names of metrics, or "all"; the paper's three by default.
+        condition: Only trials of these conditions, as of :func:`fit`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials. By default those that the rewards were learnt from, where that is known, and those to compare
+            with.
         by: Fields to group by: "condition", "cycle", "set", "participant"; by the first three by default.
         pair: Two groups whose driven paths are compared by participant, or several such pairs.
         ranks: Rank each demonstration by likelihood, least distance and area among paths sampled from the policy, by
             group, for the groups that the reward was learnt from.
+        quantiles: Shares of which quantiles by group are computed: 0.5 for medians.
+        per_trial: Long table to write, one row for each trial, type of path and metric: .csv or .parquet.
         samples: Number of paths sampled from each policy in each scene.
         precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
             deviation.
@@ -406,41 +454,41 @@ def evaluate(
     Example:
         >>> navirl.evaluate(demos, reward).to_frame()[["group", "path_type", "length_m_mean"]]
     """
-    demos = demonstrations_in(demos)
-    rewards = _rewards(reward, demos)
-    if ranks and len(rewards) != 1:
-        raise ArgumentError("`ranks` needs one `reward`")
+    given = {str(n): one for n, one in demos.items()} if isinstance(demos, Mapping) else {"demos": demos}
+    files = {name: demonstrations_in(one) for name, one in given.items()}
+    everyone = [one for own in files.values() for one in own]
+    rewards = _rewards(reward, everyone, person)
+    if ranks and not len(rewards) == len(files) == 1:
+        raise ArgumentError("`ranks` needs one `reward` and one file of demonstrations")
     measured = _metrics(metrics)
     fields = tuple(one_of(tuple(FIELDS), one, "by") for one in texts(by))
     drawing = Precision(
         int(within("samples", samples, 2, MOST)),
         None if precision is None else within("precision", precision, 1e-3, 1),
     )
-    asked = pairs_in(pair)
-    groups_named(demos, [name for one in asked for name in one], fields, "pair")  # refuses unknown ones before the work
-    one = next(iter(rewards.values()), None)
-    trained = one.trained(demos) if ranks and isinstance(one, LearntReward) else None
-    if ranks:
-        check_to_rank(demos, trained)
+    shares = tuple(within("quantiles", share, 0, 1) for share in np.atleast_1d(np.array(quantiles, dtype=float)))
+    pairs, subset = pairs_in(pair), subset_in(condition, cycle, set, participant, trial)
+    trained = [one.trained(everyone) if isinstance(one, LearntReward) else None for one in rewards.values()]
+    asked = asked_of(files, subset, trained, everything=all, pairs=pairs, fields=fields, ranked=ranks)
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
-    result = compare(demos, learnt, drawing, rng, metrics=measured, fields=fields)
-    compared = [(one, other, pairs_of(result.rows, one, other, measured, rng)) for one, other in asked]
-    ranked = Ranking()
-    if ranks:
-        ranked = ranking(demos, next(iter(learnt.values())), trained, drawing.samples, rng)
-    inputs = [*sources_behind(demos), *(file for one in rewards.values() for file in files_behind(one))]
-    document = metrics_document(result, compared, ranked, measured, inputs, drawing, seed)
-    _warn(result.notes)
-    return Evaluation(result, measured, compared, ranked, document)
+    found = answers_to(asked, learnt, measured, drawing, rng)
+    inputs = [one for own in files.values() for one in sources_behind(own)]
+    inputs += [file for one in rewards.values() for file in files_behind(one)]
+    document = metrics_document(found.result, found.pairs, found.ranked, measured, inputs, drawing, seed, shares)
+    _warn(found.result.notes)
+    if per_trial is not None:
+        write_per_trial(Path(per_trial), found.result, asked.files, measured)
+    return Evaluation(found.result, measured, found.pairs, found.ranked, document, asked.notes, shares)
 
 
-def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> ScenePolicy:
+def policy(reward: PathLike | AnyReward, demonstration: Demonstration, *, person: str | None = None) -> ScenePolicy:
     """The policy of a reward in the scene of a demonstration.
 
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
 
     Returns:
         Expected visits, soft value, reward and probabilities as arrays over the map, and paths to draw.
@@ -454,7 +502,7 @@ def policy(reward: PathLike | AnyReward, demonstration: Demonstration) -> SceneP
         >>> where.visits.shape == where.grid.shape
         True
     """
-    learnt = reward_in(reward, [demonstration])
+    learnt = reward_in(of_one(reward, person), [demonstration])
     scene = scenes_of([demonstration])[0]
     return ScenePolicy(demonstration, learnt, scene, policy_of(learnt, scene))
 
@@ -482,13 +530,18 @@ def _executor(executor: Executor | None, workers: int | None, cluster: str | Non
 
 
 def _rewards(
-    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None, demos: Sequence[Demonstration]
+    reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None,
+    demos: Sequence[Demonstration],
+    person: str | None,
 ) -> dict[str, Reward | LearntReward]:
     """Rewards by name; one alone is named "learnt"."""
     if reward is None:
+        if person is not None:
+            raise ArgumentError("`person` goes with `reward`")
         return {}
     several = isinstance(reward, Mapping) and not all(isinstance(value, int | float) for value in reward.values())
     named: Mapping[str, Any] = reward if several else {LEARNT: reward}  # type: ignore[assignment]
+    named = {name: of_one(one, person) for name, one in named.items()}
     for one in named.values():
         reward_in(one, demos)
     files = str | Path | LearntReward

@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from navirl_cli.api.results import Demonstrations, FittedReward
 from navirl_cli.artefacts.demonstrations import demonstrations_of
 from navirl_cli.artefacts.demonstrations import read_demonstrations as read_all
 from navirl_cli.artefacts.manifest import inputs_of, manifest_path, read_manifest
-from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of
+from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import ArgumentError, DemonstrationError
 from navirl_cli.files import MANIFEST, Input
 from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.fit import warnings
@@ -19,6 +19,7 @@ from navirl_cli.reports.fit import warnings
 PathLike: TypeAlias = str | Path
 #: A learnt reward, or values by the names of the parameters; the other parameters keep their initial values.
 AnyReward: TypeAlias = LearntReward | Reward | Mapping[str, float]
+Given = TypeVar("Given")
 
 
 def read_demonstrations(path: PathLike) -> Demonstrations:
@@ -52,20 +53,22 @@ def read_demonstrations(path: PathLike) -> Demonstrations:
     )
 
 
-def read_reward(path: PathLike) -> FittedReward:
+def read_reward(path: PathLike, person: str | None = None) -> FittedReward:
     """Read a reward file.
 
     Args:
         path: As written by ``navirl fit`` or :meth:`FittedReward.write`.
+        person: One of the people of a reward fitted with ``pool="persons"``, whose own reward is wanted; by default the
+            typical one.
 
     Returns:
         The reward.
 
     Raises:
-        NavirlError: The file is missing or is not a reward file.
+        NavirlError: The file is missing or is not a reward file, or holds no reward of this person.
     """
     path = Path(path)
-    document = read_json(path, "reward")
+    document = reward_content(path, person)
     content = {key: value for key, value in document.items() if key not in {"format", "version", "navirl"}}
     return FittedReward.of(learnt_of(document, str(path)), content, notes=tuple(warnings(content)), file=Input.of(path))
 
@@ -99,6 +102,37 @@ def files_behind(reward: object) -> list[Input]:
 def learnt_in(reward: PathLike | LearntReward) -> LearntReward:
     """A learnt reward; a file is read."""
     return read_reward(reward) if isinstance(reward, str | Path) else reward
+
+
+def prior_in(reward: PathLike | LearntReward, person: str | None) -> LearntReward:
+    """An earlier reward, to learn that of a person if one is named; a file is read.
+
+    Raises:
+        ArgumentError: A person is named, and the reward is not one that ``fit`` learnt.
+        ArtefactError: A person is named, and the reward is one for all.
+    """
+    learnt = learnt_in(reward)
+    if person is None:
+        return learnt
+    if learnt.others is not None and person not in learnt.persons:
+        return learnt
+    return learnt_in(of_one(learnt, person))
+
+
+def of_one(reward: Given, person: str | None) -> "Given | FittedReward":
+    """The reward of one of the people of a reward; the reward itself for None.
+
+    Raises:
+        ArgumentError: The reward is not one that ``fit`` learnt.
+        ArtefactError: It holds no reward of this person.
+    """
+    if person is None:
+        return reward
+    if isinstance(reward, str | Path):
+        return read_reward(reward, person)
+    if not isinstance(reward, FittedReward):
+        raise ArgumentError("`person`: expected a reward that was fitted with `pool` persons, found another")
+    return reward.person(person)
 
 
 def reward_in(reward: PathLike | AnyReward, demonstrations: Sequence[Demonstration] = ()) -> Reward:

@@ -12,29 +12,31 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import numpy as np
 
-from navirl_cli.api.arguments import one_of, texts, within
+from navirl_cli.api.arguments import one_of, subset_in, texts, within
 from navirl_cli.api.calls import policy as policy_in
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, reward_in
+from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
 from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, ArtefactError
+from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import group_of, groups_named
+from navirl_cli.evaluation.groups import Trained, group_of, groups_named
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.actions import draw_actions
 from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.overlay import alike, overlays_of
+from navirl_cli.figures.overlay import driven, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
-from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
+from navirl_cli.figures.style import COLUMN_IN, FONTS, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ class PageOptions(TypedDict, total=False):
     wide: bool
     #: "paper", "screen" (twice the pixels) or "dark".
     style: str
+    #: "sans", or "times" for letters like those of an IEEE paper.
+    font: str
     #: File to write: .png, .pdf or .svg, with embedded fonts. The figure is then not shown.
     output: PathLike | None
     #: Replace an existing file.
@@ -59,25 +63,42 @@ class PageOptions(TypedDict, total=False):
 def paths(
     demos: PathLike | Sequence[Demonstration],
     *,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
     axes: "Axes | None" = None,
     crop: bool = False,
+    together: bool = False,
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
 
     Args:
         demos: Demonstrations, or their file.
+        condition: Only trials of these conditions, as of :func:`navirl_cli.fit`; so are cycle, set, participant and
+            trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the paths.
+        together: One map for all groups, also with more than 40 paths and without `axes`.
         **page: As in :class:`PageOptions`.
 
     Returns:
-        The axes.
+        The axes; those of the first group where each has its own.
 
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
+    demonstrations = subset_in(condition, cycle, set, participant, trial).of(demonstrations_in(demos))
+    groups = [] if together or axes is not None else panels_of(demonstrations)
+    if groups:
+        shape = {"panels": len(groups), "columns": 2}
+        return _drawn(lambda panels: draw_path_panels(panels, groups, crop=crop), None, page, **shape)[0]
     return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
 
 
@@ -85,6 +106,7 @@ def policy(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -98,13 +120,14 @@ def policy(
     Args:
         reward: A reward, its file, or values by name of parameter.
         demonstration: Gives the map, the people, the start and the goal.
+        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         axes: Axes to draw on; a new figure by default.
         crop: Show only the surroundings of the likely paths.
-        overlay: Draw paths over the map: "demos", "samples", or both.
+        overlay: Draw paths over the map: "demos" (in this scene by this participant), "all" (all of demos on this
+            map), "samples"; one or several.
         samples: Number of paths sampled from the policy.
         seed: The same seed gives the same paths.
-        demos: Demonstrations for the overlay; those in the same scene are drawn. By default the given demonstration
-            alone.
+        demos: Demonstrations for the overlay. By default the given demonstration alone.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -113,7 +136,7 @@ def policy(
     Raises:
         NavirlError: The scene has no policy under the reward, or the figure cannot be written.
     """
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), _own(axes), page)[
         0
@@ -124,6 +147,7 @@ def reward(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -133,7 +157,7 @@ def reward(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     by_cell = view.reward.by_cell(view.scene)
     return _drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), _own(axes), page)[0]
@@ -143,6 +167,7 @@ def value(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -152,7 +177,7 @@ def value(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), _own(axes), page
@@ -163,6 +188,7 @@ def actions(
     reward: PathLike | AnyReward,
     demonstration: Demonstration,
     *,
+    person: str | None = None,
     axes: "Axes | None" = None,
     crop: bool = False,
     overlay: str | Collection[str] = (),
@@ -172,7 +198,7 @@ def actions(
     **page: Unpack[PageOptions],
 ) -> "Axes":
     """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration)
+    view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
     return _drawn(
         lambda panels: draw_actions(
@@ -187,17 +213,33 @@ def properties(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward | None = None,
     *,
+    person: str | None = None,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     samples: int = 100,
     seed: int = 0,
+    bars: bool = False,
     **page: Unpack[PageOptions],
 ) -> "list[Axes]":
-    """Draw length, distance and area of paths by condition, as bars (the paper's Fig. 7).
+    """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
         demos: Demonstrations, or their file.
-        reward: Adds bars of the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
+        person: As in :func:`policy`.
+        condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials. By default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
+        bars: Bars from 0 with standard deviations, in place of points.
         **page: As in :class:`PageOptions`.
 
     Returns:
@@ -206,14 +248,21 @@ def properties(
     Raises:
         NavirlError: There are no demonstrations, or the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
+    everyone = demonstrations_in(demos)
+    if person is not None and reward is None:
+        raise ArgumentError("`person` goes with `reward`")
+    reward = None if reward is None else of_one(reward, person)
+    trained = [] if reward is None else [_trained(reward, everyone)]
+    subset = subset_in(condition, cycle, set, participant, trial)
+    demonstrations = choose(everyone, subset, trained, everything=all).demonstrations
     learnt = {} if reward is None else {LEARNT: reward_in(reward, demonstrations)}
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
-    bars = bars_of(result.groups, _taught(reward, demonstrations))
-    panels = len(PAPER_METRICS)
-    height_in = height_for(bars, _width_in(page))
-    return _drawn(lambda axes: draw_properties(axes, bars), None, page, panels=panels, height_in=height_in)
+    rows = bars_of(result.groups, _taught(reward, demonstrations))
+    panels, height_in = len(PAPER_METRICS), height_for(rows, _width_in(page))
+    return _drawn(
+        lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, panels=panels, height_in=height_in
+    )
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
@@ -237,6 +286,13 @@ def ranks(
     demos: PathLike | Sequence[Demonstration],
     reward: PathLike | AnyReward,
     *,
+    person: str | None = None,
+    condition: str | Collection[str] = (),
+    cycle: int | Collection[int] = (),
+    set: str | Collection[str] = (),  # noqa: A002 the option's name
+    participant: str | Collection[str] = (),
+    trial: str | Collection[str] = (),
+    all: bool = False,  # noqa: A002 the option's name
     group: str | Sequence[str] = (),
     samples: int = 1000,
     seed: int = 0,
@@ -247,6 +303,13 @@ def ranks(
     Args:
         demos: Demonstrations, or their file.
         reward: A reward, its file, or values by name of parameter.
+        person: As in :func:`policy`.
+        condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
+        cycle: Only trials of these cycles.
+        set: Only trials of these sets.
+        participant: Only trials of these participants.
+        trial: Only these trials.
+        all: All trials, also of groups that the reward was not learnt from.
         group: Groups to rank; by default those that the reward was learnt from, where that is known.
         samples: Number of paths sampled from the policy in each scene.
         seed: The same seed gives the same paths.
@@ -259,12 +322,14 @@ def ranks(
         NavirlError: A scene has no policy under the reward, no demonstration is like those that it was learnt from, or
             the figure cannot be written.
     """
-    demonstrations = demonstrations_in(demos)
-    parameters = reward_in(reward, demonstrations)
-    known = isinstance(reward, str | Path | LearntReward)
-    trained = learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]
+    everyone, subset = demonstrations_in(demos), subset_in(condition, cycle, set, participant, trial)
+    reward = of_one(reward, person)
+    parameters, trained = reward_in(reward, everyone), _trained(reward, everyone)
+    demonstrations = choose(everyone, subset, everything=all).demonstrations
     if names := texts(group):
         chosen = [one for own in groups_named(demonstrations, names) for one in own]
+    elif subset.names or all:
+        chosen = list(demonstrations)
     else:
         check_to_rank(demonstrations, trained)
         chosen, _ = chosen_to_rank(demonstrations, trained)
@@ -350,11 +415,12 @@ def _drawn(
 ) -> "list[Axes]":
     """Draw on given axes, or on a new figure that is shown or written."""
     output, style = page.get("output"), one_of(tuple(LOOKS), page.get("style", "paper"), "style")
+    font = one_of(tuple(FONTS), page.get("font", "sans"), "font")
     if axes is not None and output is not None:
         raise ArgumentError("`output` is for new figures: save the figure of your `axes` yourself")
     if output is not None:
         check_target(Path(output), force=page.get("force", False))
-    with styled(style):
+    with styled(style, font):
         if axes is not None:
             draw(axes)
             return axes
@@ -376,14 +442,20 @@ def _cells(
     demos: Sequence[Demonstration],
 ) -> CellOptions:
     """Common options of all figures of a scene; cropped figures have the same view."""
-    wanted = {one_of(("demos", "samples"), one, "overlay") for one in texts(overlay)}
-    overlays = overlays_of(
-        alike(demos or [view.demonstration], view.demonstration) if "demos" in wanted else (),
-        view.sample(samples, seed=seed) if "samples" in wanted else (),
-    )
+    wanted = {one_of(("demos", "all", "samples"), one, "overlay") for one in texts(overlay)}
+    shown: Sequence[Demonstration] = ()
+    if wanted & {"demos", "all"}:
+        shown, _ = driven(demos or [view.demonstration], view.demonstration, everywhere="all" in wanted)
+    overlays = overlays_of(shown, view.sample(samples, seed=seed) if "samples" in wanted else ())
     lines = [line for one in overlays for line in one.lines_m]
     window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
     return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}
+
+
+def _trained(reward: PathLike | AnyReward, demonstrations: Sequence[Demonstration]) -> Trained | None:
+    """What a reward was learnt from; None where that is unknown."""
+    known = isinstance(reward, str | Path | LearntReward)
+    return learnt_in(reward).trained(demonstrations) if known else None  # type: ignore[arg-type]
 
 
 def _taught(reward: PathLike | AnyReward | None, demonstrations: Sequence[Demonstration]) -> set[str]:

@@ -1,6 +1,6 @@
 """Results of the public functions: tables and arrays to print, write, and convert to pandas."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from navirl_cli.api.arguments import subset_in
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.demonstrations import demonstrations_document
-from navirl_cli.artefacts.rewards import LearntReward
+from navirl_cli.artefacts.persons import of_person
+from navirl_cli.artefacts.rewards import LearntReward, learnt_of
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
@@ -30,7 +32,7 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
 from navirl_cli.reports.evaluation import evaluation_text, write_evaluation
 from navirl_cli.reports.extraction import trial_table
-from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit import report, warnings
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -90,12 +92,40 @@ class Demonstrations(Sequence[Demonstration]):
         """A trial, or several."""
         if isinstance(index, int):
             return self._trials[index]
-        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
-        return Demonstrations(self._trials[index], notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
+        return self._with(self._trials[index])
 
     def __repr__(self) -> str:
         """The table of trials."""
         return to_text([trial_table(self)])
+
+    def select(
+        self,
+        *,
+        condition: str | Collection[str] = (),
+        cycle: int | Collection[int] = (),
+        set: str | Collection[str] = (),  # noqa: A002 the option's name
+        participant: str | Collection[str] = (),
+        trial: str | Collection[str] = (),
+    ) -> "Demonstrations":
+        """The trials of some conditions, cycles, sets, participants, or with some ids, as ``navirl select``.
+
+        Args:
+            condition: "force", "joystick", "autonomous"; one or several, as all arguments.
+            cycle: Numbers of cycles.
+            set: Names of sets; "main task" for trials of none.
+            participant: Names of participants.
+            trial: Ids.
+
+        Raises:
+            NavirlError: There are no such trials.
+        """
+        chosen = subset_in(condition, cycle, set, participant, trial).of(self._trials)
+        return self._with(chosen)
+
+    def _with(self, trials: Iterable[Demonstration]) -> "Demonstrations":
+        """Some of the trials, with the same sources."""
+        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
+        return Demonstrations(trials, notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
 
     def sources(self) -> tuple[Input, ...]:
         """The file that the trials were read from, or the logs that they were extracted from."""
@@ -168,6 +198,15 @@ class FittedReward(LearntReward):
         if name not in values:
             raise ArgumentError(unknown("parameter", name, values))
         return values[name]
+
+    def person(self, name: str) -> "FittedReward":
+        """The own reward of one of :attr:`persons`, after a fit with ``pool="persons"``.
+
+        Raises:
+            ArtefactError: There is no reward of this person.
+        """
+        content = of_person(self.document or {}, name, "reward")
+        return FittedReward.of(learnt_of(content, "reward"), content, notes=tuple(warnings(content)), file=self.file)
 
     def __repr__(self) -> str:
         """The parameters and how the fit ended, as ``navirl fit`` prints them."""
@@ -293,6 +332,8 @@ class Evaluation:
         pairs: Groups compared by participant.
         ranks: Ranks of the demonstrations among paths of the policy, and how many were not ranked.
         document: The content of a metrics file.
+        notes: Which demonstrations were measured, where the reward decided it.
+        quantiles: Shares whose quantiles were asked for.
     """
 
     comparison: Comparison
@@ -300,13 +341,15 @@ class Evaluation:
     pairs: Sequence[tuple[str, str, Mapping[str, Paired]]]
     ranks: Ranking
     document: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+    quantiles: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         """The tables, as ``navirl evaluate`` prints them."""
-        return self._written(Format.TEXT)
+        return "\n".join((self._written(Format.TEXT), *(f"note: {line}" for line in self.notes)))
 
     def _written(self, how: Format) -> str:
-        return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how)
+        return evaluation_text(self.comparison, self.pairs, self.ranks, self.metrics, how, quantiles=self.quantiles)
 
     def to_frame(self, table: str = "groups") -> "DataFrame":
         """One of the tables.

@@ -7,10 +7,10 @@ from typing import Any
 from navirl_cli.artefacts.store import number, read_json
 from navirl_cli.evaluation.compare import DRIVEN, Comparison
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import GroupMetrics, Measured
+from navirl_cli.evaluation.groups import GroupMetrics, Measured, quantiles_of
 from navirl_cli.evaluation.metrics import Metric, Values
 from navirl_cli.evaluation.paired import Interval, Paired
-from navirl_cli.evaluation.ranks import Ranking, by_group_and_training, uniformity
+from navirl_cli.evaluation.ranks import Ranking, by_group_and_training
 from navirl_cli.files import Input
 
 #: Two groups and their comparison by metric.
@@ -25,6 +25,7 @@ def metrics_document(
     inputs: Sequence[Input],
     precision: Precision,
     seed: int,
+    quantiles: Sequence[float] = (),
 ) -> dict[str, Any]:
     """The content of a metrics file.
 
@@ -36,6 +37,7 @@ def metrics_document(
         inputs: The files that it was made from.
         precision: How many paths were drawn.
         seed: Of what was drawn by chance.
+        quantiles: Shares that were asked for.
     """
     names = [metric.name for metric in metrics]
     learnt = any(row.error for row in result.groups)
@@ -53,7 +55,23 @@ def metrics_document(
             for one, other, found in pairs
         ],
         "ranks": None if not ranked.ranks else _ranks(ranked),
+        **({"quantiles": _quantiles(result, names, quantiles)} if quantiles else {}),
     }
+
+
+def _quantiles(result: Comparison, names: Sequence[str], shares: Sequence[float]) -> list[dict[str, Any]]:
+    """Quantiles over the demonstrations of each group, by type of path."""
+    return [
+        {
+            "group": own.group,
+            "path_type": own.path_type,
+            "count": own.count,
+            "share": share,
+            "metrics": _chosen(values, names),
+        }
+        for own in quantiles_of(result.rows, names, shares)
+        for share, values in own.values.items()
+    ]
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
@@ -105,6 +123,7 @@ def _pair(one: Paired) -> dict[str, Any]:
         **_interval("bootstrap", one.bootstrap),
         "n": one.n,
         "wilcoxon_p": number(one.wilcoxon_p),
+        **({} if one.holm_p is None else {"holm_p": number(one.holm_p)}),
         "cohen_dz": number(one.cohen_dz),
         "rank_biserial": number(one.rank_biserial),
         "by_participant": dict(one.differences),
@@ -121,7 +140,7 @@ def _ranks(ranked: Ranking) -> dict[str, Any]:
     """Ranks and their test by group."""
     groups = []
     for own in by_group_and_training(ranked.ranks):
-        statistic, p_value = uniformity(own.ranks)
+        statistic, p_value = own.uniformity()
         groups.append(
             {
                 "group": own.group,

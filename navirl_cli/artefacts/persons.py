@@ -12,8 +12,8 @@ from navirl_cli.irl.intervals import LEVEL, Errors, Kind
 from navirl_cli.irl.log_scale import LogScale
 from navirl_cli.irl.newcomer import Others
 from navirl_cli.irl.population import Person, Population
-from navirl_cli.irl.random_effects import Spread
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.uncertainty import condition_number
 
 
@@ -126,11 +126,10 @@ def of_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any
     names = names_of_persons(content)
     if not names:
         raise ArtefactError(
-            f"{path}: `person`: expected a reward with one for each person, found one reward for all; fit with `pool` "
-            "persons"
+            f"{path}: expected a reward with one for each person, found one reward for all; fit with `pool` persons"
         )
     if name not in names:
-        raise ArtefactError(f"{path}: {unknown('`person`', name, names)}")
+        raise ArtefactError(f"{path}: {unknown('person', name, names)}")
     own = content["population"]["persons"][names.index(name)]
     parameters = [_merged(one, typical, own, path) for one, typical in _pairs(own, content, path)]
     covariance = _square(own["covariance"], len(parameters), f"{path}: population/persons/{name}/covariance")
@@ -169,6 +168,16 @@ def of_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any
             {"method": Kind.POSTERIOR.value, "errors": Errors.MODEL.value, "level": LEVEL, "parameters": ends}
         ],
     }
+
+
+def for_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any]:
+    """What a reward file's content says about a person beforehand: the own reward, or for a new person all of it.
+
+    Raises:
+        ArtefactError: The file holds one reward for all.
+    """
+    known = name in names_of_persons(content) or not names_of_persons(content)
+    return of_person(content, name, path) if known else dict(content)
 
 
 def _pairs(

@@ -1,5 +1,6 @@
 """Files of planned paths: JSON to keep, CSV to look at, and the poses that Nav2 takes, as YAML or as a log."""
 
+import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -9,12 +10,15 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.store import number, numbers, read_json, write_json
+from navirl_cli.errors import ArtefactError
 from navirl_cli.files import Input, replacing
 from navirl_cli.irl.reward import Reward
 from navirl_cli.planning.paths import Mode, Path, Planner, measured, rewards_by_term
 from navirl_cli.planning.problem import Problem
 from navirl_cli.planning.smooth import SmoothLine
 
+#: Length of the shortest path that can be driven, m.
+_LEAST_M: Final = 0.5
 #: Topic of the paths in a log, as Nav2's planners name it; further ones have a number behind it.
 PLAN_TOPIC: Final = "/plan"
 
@@ -106,6 +110,31 @@ def read_plan(path: FilePath) -> dict[str, Any]:
         ArtefactError: As in :func:`navirl_cli.artefacts.store.read_json`.
     """
     return read_json(path, "plan")
+
+
+def read_line(path: FilePath) -> FloatArray:
+    """(k, 2) m, map frame: the first path of a plan file, .json or .csv, or of any CSV table with x_m and y_m.
+
+    Raises:
+        ArtefactError: The file cannot be read, or holds no path.
+    """
+    if path.suffix == ".json":
+        line = np.array(read_plan(path)["paths"][0]["xy_m"], dtype=float)
+    else:
+        try:
+            rows = list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+            first = [row for row in rows if row.get("path") == rows[0].get("path")]
+            line = np.array([(float(row["x_m"]), float(row["y_m"])) for row in first])
+        except OSError as error:
+            raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
+        except (KeyError, ValueError, TypeError, csv.Error) as error:
+            raise ArtefactError(
+                f"{path}: expected a CSV table with numbers under x_m and y_m, as navirl plan writes it, found none "
+                f"({error})"
+            ) from error
+    if len(line) < 2 or not np.isfinite(line).all() or np.hypot(*np.diff(line, axis=0).T).sum() < _LEAST_M:
+        raise ArtefactError(f"{path}: expected a path of at least {_LEAST_M:g} m, found {len(line)} points without one")
+    return line
 
 
 def write_plan(output: FilePath, content: Mapping[str, Any], *, force: bool) -> None:

@@ -17,7 +17,7 @@ from navirl_cli.artefacts.analyses import (
     reach_document,
     validation_document,
 )
-from navirl_cli.artefacts.persons import names_of_persons, of_person, others_of, population_document
+from navirl_cli.artefacts.persons import for_person, names_of_persons, of_person, others_of, population_document
 from navirl_cli.artefacts.store import number, numbers, read_json, row
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArtefactError, NavirlError, RewardError
@@ -65,6 +65,7 @@ class LearntReward(ByContent):
     profiles: tuple[Profile, ...] = ()
     #: Groups of these demonstrations; None for files from before they were written.
     groups: tuple[str, ...] | None = None
+    #: Those whose demonstrations it was learnt from; for one person's reward also those towards whom it is drawn.
     participants: tuple[str, ...] = ()
     #: None for files from before it was written.
     search: Search | None = None
@@ -87,14 +88,17 @@ class LearntReward(ByContent):
         people = frozenset(self.participants) or frozenset(one.participant for one in own)
         return Trained(ids, people, groups) if groups else None
 
-    def as_prior(self) -> Prior:
+    def as_prior(self, person: str | None = None) -> Prior:
         """The prior that this fit gives to the next one.
+
+        Args:
+            person: The next person, where the fit is of people who differ.
 
         Raises:
             RewardError: The fit did not reach its maximum, its covariance is not positive definite, or it is of people
                 who differ.
         """
-        if self.others is not None:
+        if self.others is not None and person is None:
             raise RewardError(
                 "`prior`: expected one reward, found one for each person; say whose reward to learn with `person`"
             )
@@ -102,6 +106,8 @@ class LearntReward(ByContent):
             raise RewardError(
                 f"`prior`: expected a fit at its maximum, found one that ended with {self.status.value}; fit it again"
             )
+        if self.others is not None:
+            return self.others.prior()
         return Prior.gaussian(np.array(self.reward.theta), self.covariance)
 
 
@@ -266,7 +272,7 @@ def learnt_of(document: Mapping[str, Any], path: str) -> LearntReward:
         resolution_m=document["resolution_m"],
         demonstrations=tuple(document["demonstrations"]),
         groups=tuple(document["groups"]) if "groups" in document else None,
-        participants=tuple(document["participants"]),
+        participants=(*document["participants"], *document.get("shrunk_towards", ())),
         status=Status(document["status"]),
         profiles=profiles,
         intervals=tuple(intervals_of(one, names, path) for one in document.get("intervals", ())),
@@ -300,6 +306,23 @@ def read_reward_for(path: Path, demonstrations: Sequence[Demonstration], person:
             means something else where steps have another length.
     """
     learnt = read_reward(path, person)
+    check_cells(learnt, demonstrations, str(path))
+    return learnt
+
+
+def read_prior_for(path: Path, demonstrations: Sequence[Demonstration], person: str | None) -> LearntReward:
+    """An earlier reward of a file, for learning from demonstrations.
+
+    Args:
+        path: The file.
+        demonstrations: Those to learn from.
+        person: Whose reward is learnt; None for that of all.
+
+    Raises:
+        ArtefactError: As in :func:`read_reward_for`, or the file holds one reward for all, and a person is named.
+    """
+    content = reward_content(path)
+    learnt = learnt_of(content if person is None else for_person(content, person, str(path)), str(path))
     check_cells(learnt, demonstrations, str(path))
     return learnt
 

@@ -18,6 +18,8 @@ from navirl_cli.artefacts.versions import VERSION, is_known, upgraded
 from navirl_cli.errors import ArtefactError, brief
 from navirl_cli.files import read_regular, replacing
 
+#: The kinds of artefacts.
+KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
@@ -58,16 +60,54 @@ def read_json(path: Path, artefact: str, sha256: str | None = None) -> dict[str,
     Raises:
         ArtefactError: The file is missing, is not JSON or another artefact, or does not fit the schema.
     """
+    return _checked(_content(path, artefact, sha256), path, artefact)
+
+
+def read_any(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read an artefact of any kind.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its kind, as in :func:`write_json`, and its content as of :func:`read_json`.
+
+    Raises:
+        ArtefactError: As in :func:`read_json`.
+    """
+    document = _content(path, " or ".join(KINDS))
+    found = document.get("format") if isinstance(document, dict) else None
+    kind = next((kind for kind in KINDS if found == f"navirl/{kind}"), None)
+    if kind is None:
+        what = f"format {brief(found)}" if isinstance(found, str) else "other JSON"
+        raise ArtefactError(f"{path}: expected a file of navirl {' or '.join(KINDS)}, found {what}")
+    return kind, _checked(document, path, kind)
+
+
+def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
+    """The content of a JSON file; arguments as of :func:`read_json`.
+
+    Raises:
+        ArtefactError: It cannot be read.
+    """
     try:
         data = read_regular(path)
         if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
             raise ArtefactError(f"{path}: expected the bytes that the manifest names, found others; extract again")
-        document = _parsed(data.decode("utf-8"))
+        return _parsed(data.decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
         raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
+
+
+def _checked(document: Any, path: Path, artefact: str) -> dict[str, Any]:
+    """A file's content in the present version, checked.
+
+    Raises:
+        ArtefactError: It is another artefact, or does not fit the schema.
+    """
     found = document.get("format") if isinstance(document, dict) else None
     if found != f"navirl/{artefact}":
         what = f"a file of format {brief(found)}" if isinstance(found, str) else "other JSON"
@@ -89,7 +129,11 @@ def _parsed(text: str) -> Any:
     """
     document = json.loads(text, parse_constant=_refuse_constant)
     if _SURROGATE.search(text):
-        json.dumps(document, ensure_ascii=False).encode("utf-8")
+        try:
+            json.dumps(document, ensure_ascii=False).encode("utf-8")
+        except UnicodeEncodeError as error:
+            half = ascii(error.object[error.start])[1:-1]
+            raise ValueError(f"{half}, half of a surrogate pair, which no text has; write the file again") from error
     return document
 
 

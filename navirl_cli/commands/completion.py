@@ -44,12 +44,37 @@ def _files(ctx: click.Context, name: str) -> list[Path]:
     return [Path(one) for one in ([found] if isinstance(found, Path) else found)]
 
 
+def _demos(ctx: click.Context) -> Path:
+    """The demonstrations file on the command line: the argument, or that of ``--scene DEMOS[:TRIAL]``."""
+    scene = ctx.params.get("scene")
+    if scene is None:
+        return _files(ctx, "demos")[0]
+    return Path(scene if Path(scene).exists() else scene.rpartition(":")[0])
+
+
 @_proposed
 def trials(ctx: click.Context, _incomplete: str) -> Iterator[str]:
     """Ids of the demonstrations in the file on the command line."""
     from navirl_cli.artefacts.demonstrations import read_demonstrations
 
-    return (one.id for one in read_demonstrations(_files(ctx, "demos")[0]))
+    return (one.id for one in read_demonstrations(_demos(ctx)))
+
+
+def _names(field: str) -> Complete:
+    """Names of a field of the demonstrations in the file on the command line."""
+
+    @_proposed
+    def names(ctx: click.Context, _incomplete: str) -> Iterable[str]:
+        from navirl_cli.artefacts.demonstrations import read_demonstrations
+        from navirl_cli.demos.subset import FIELDS
+
+        found = [FIELDS[field](one) for one in read_demonstrations(_demos(ctx))]
+        return sorted({name.removeprefix("cycle ") for name in found if name != "no cycle"})
+
+    return names
+
+
+cycles, sets, participants = _names("cycle"), _names("set"), _names("participant")
 
 
 @_proposed
@@ -85,6 +110,17 @@ def terms(_ctx: click.Context, incomplete: str) -> Iterator[str]:
 
     before, comma, _ = incomplete.rpartition(",")
     yield from (f"{before}{comma}{name}" for name in TERMS if name not in before.split(","))
+
+
+@_proposed
+def persons(ctx: click.Context, _incomplete: str) -> Iterable[str]:
+    """The people whose rewards the reward files on the command line hold."""
+    from navirl_cli.artefacts.persons import names_of_persons
+    from navirl_cli.artefacts.rewards import reward_content
+
+    files = ctx.params.get("rewards") or ctx.params.get("reward") or ctx.params.get("prior_file")
+    for path in files if isinstance(files, tuple) else (files,):
+        yield from names_of_persons(reward_content(path))
 
 
 @_proposed

@@ -1,6 +1,6 @@
 """``navirl evaluate``: metrics of demonstrated, learnt and baseline paths, and comparisons of groups."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -8,8 +8,9 @@ from typing import Any
 import click
 
 from navirl_cli.artefacts.metrics import metrics_document
-from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -19,22 +20,42 @@ from navirl_cli.commands.shared import (
     force_option,
     json_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
+    say,
     seed_option,
 )
-from navirl_cli.commands.types import Choice, FilePath, Number
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.types import Choice, FilePath, Number, OutputPath
+from navirl_cli.commands.usage import Command, Example, refuse_unused, section
+from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import unknown
-from navirl_cli.evaluation.compare import compare
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.groups import FIELDS, groups_named
 from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.paired import pairs_of
-from navirl_cli.evaluation.ranks import Ranking, check_to_rank, ranking
+from navirl_cli.evaluation.questions import answers_to, asked_of
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
+from navirl_cli.reports.per_trial import write_per_trial
+
+
+class Shares(click.ParamType):  # type: ignore[type-arg]
+    """Comma-separated shares from 0 to 1."""
+
+    name = "share,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Parse and check."""
+        if not isinstance(value, str):
+            return tuple(value)
+        try:
+            shares = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            shares = (-1.0,)
+        if not all(0 <= share <= 1 for share in shares):
+            self.fail(f"expected numbers from 0 to 1 as 0.25,0.5,0.75, found {value!r}", param, ctx)
+        return tuple(dict.fromkeys(shares))
 
 
 class Metrics(click.ParamType):  # type: ignore[type-arg]
@@ -63,10 +84,14 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
             "Two metrics of two groups, compared by participant",
             "navirl evaluate demos.json --metrics length_m,area_m2 --pair 'force, cycle 2' joystick",
         ),
-        Example("A table for a paper", "navirl evaluate demos.json --reward reward.json --samples 100 -o metrics.tex"),
+        Example(
+            "Several files in a table for a paper, with medians",
+            "navirl evaluate monday.json tuesday.json --quantiles 0.5 -o metrics.tex",
+        ),
     ],
 )
-@click.argument("demos", metavar="DEMOS", required=False, type=FilePath)
+@click.argument("demos", metavar="DEMOS...", nargs=-1, type=FilePath)
+@choice_options(reward=True)
 @section(
     "Metrics",
     click.option(
@@ -86,6 +111,12 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         type=Choice(list(FIELDS)),
         help="Group by this; repeatable.  [default: condition, cycle and set]",
     ),
+    click.option(
+        "--quantiles",
+        type=Shares(),
+        default=(),
+        help="Also quantiles by group of these shares, comma-separated: 0.5 for medians, or 0.25,0.5,0.75.",
+    ),
 )
 @section(
     "Learnt paths",
@@ -96,6 +127,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         type=FilePath,
         help="Learnt reward, to measure the paths of its policy too; repeatable.",
     ),
+    person_option,
     samples_option(),
     click.option(
         "--precision",
@@ -134,18 +166,28 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
         show_default=True,
         help="Format of the printed tables.",
     ),
+    click.option(
+        "--per-trial",
+        type=OutputPath((".csv", ".parquet")),
+        help="Long table to write as well, one row for each trial, type of path and metric: .csv, or .parquet where "
+        "pandas and pyarrow are installed.",
+    ),
     output_option("File to write as well: .json, .csv, .md or .tex.", *ENDINGS, required=False),
     json_option,
     force_option,
 )
 def evaluate(
-    demos: Path | None,
+    demos: tuple[Path, ...],
+    choosing: Choosing,
     rewards: tuple[Path, ...],
+    person: str | None,
     metrics: tuple[Metric, ...],
     list_metrics: bool,
     fields: tuple[str, ...],
     pairs: tuple[tuple[str, str], ...],
     ranks: bool,
+    quantiles: tuple[float, ...],
+    per_trial: Path | None,
     samples: int,
     error: float | None,
     seed: int,
@@ -156,6 +198,9 @@ def evaluate(
 ) -> None:
     """Measure demonstrated, learnt and baseline paths, and compare groups of them.
 
+    Several files of demonstrations stand in one table, and groups of the same name are compared by participant; so are
+    the learnt paths of several rewards. With several tests, p-values are also given by Holm's method.
+
     Each metric has a mean and a standard deviation by group: over demonstrations for driven paths, over the policy for
     learnt paths. Distances are from the robot's shell to people's centres. Expected visits of the policy give exact
     means of path length, heading change and path length in zones; the other means are over sampled paths.
@@ -165,43 +210,66 @@ def evaluate(
     if list_metrics:
         _list_metrics(Format(style), as_json=as_json)
         return
-    if demos is None:
-        raise click.UsageError("Missing argument 'DEMOS'.")
-    _check_arguments(rewards, pairs, ranks=ranks)
-    if output is not None:
-        check_output(output, [demos, *rewards], force=force)
-    demonstrations = demonstrations_in(demos)
-    groups_named(demonstrations, [name for pair in pairs for name in pair], fields, "pair")  # refuses unknown ones
-    files = {path.stem: read_reward_for(path, demonstrations) for path in rewards}
-    learnt = {name: one.reward for name, one in files.items()}
-    trained = next(iter(files.values())).trained(demonstrations) if ranks else None
-    if ranks:
-        check_to_rank(demonstrations, trained)
+    _check_arguments(demos, rewards, pairs, ranks=ranks)
+    refuse_unused("--reward", "person", used=bool(rewards))
+    outputs = [path for path in (output, per_trial) if path is not None]
+    for path in outputs:
+        check_output(path, [*demos, *rewards], force=force)
+    everyone = dict(zip(_names(demos), map(demonstrations_in, demos), strict=True))
+    learnt = {path.stem: _reward_for(path, everyone, person) for path in rewards}
+    trained = [one.trained([d for own in everyone.values() for d in own]) for one in learnt.values()]
+    asked = asked_of(
+        everyone,
+        choosing.subset,
+        trained,
+        everything=choosing.everything,
+        pairs=pairs,
+        fields=fields,
+        ranked=ranks,
+    )
+    for line in asked.notes:
+        say(line)
     rng, precision = np.random.default_rng(seed), Precision(samples, error)
-    with progress_bar("evaluate", len(demonstrations)) as update:
-        result = compare(
-            demonstrations,
-            learnt,
+    with progress_bar("evaluate", sum(map(len, asked.files.values()))) as update:
+        found = answers_to(
+            asked,
+            {name: one.reward for name, one in learnt.items()},
+            metrics,
             precision,
             rng,
-            metrics=metrics,
-            fields=fields,
-            progress=lambda done, _all: update(done, ""),
+            lambda done, _all: update(done, ""),
         )
-    compared = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in pairs]
-    ranked = Ranking()
-    if ranks:
-        ranked = ranking(demonstrations, next(iter(learnt.values())), trained, samples, rng)
-    inputs = [Input.of(path) for path in (demos, *rewards)]
-    document = metrics_document(result, compared, ranked, metrics, inputs, precision, seed)
-    text = partial(evaluation_text, result, compared, ranked, metrics)
+    document = metrics_document(
+        found.result,
+        found.pairs,
+        found.ranked,
+        metrics,
+        [Input.of(path) for path in (*demos, *rewards)],
+        precision,
+        seed,
+        quantiles,
+    )
+    if per_trial is not None:
+        write_per_trial(per_trial, found.result, asked.files, metrics, force=force)
+    text = partial(evaluation_text, found.result, found.pairs, found.ranked, metrics, quantiles=quantiles)
     if output is not None:
         write_evaluation(output, document, text, force=force)
     if as_json:
         echo_json(document)
     else:
         echo(text(Format(style)))
-    finish(result.notes)
+    finish(found.result.notes)
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Names of files: their stems, or their paths where stems are the same."""
+    stems = [path.stem for path in paths]
+    return [path.stem if stems.count(path.stem) == 1 else str(path) for path in paths]
+
+
+def _reward_for(path: Path, files: Mapping[str, Sequence[Demonstration]], person: str | None) -> LearntReward:
+    """A reward, checked against the cells of all demonstrations."""
+    return read_reward_for(path, [one for own in files.values() for one in own], person)
 
 
 def _list_metrics(how: Format, *, as_json: bool) -> None:
@@ -212,8 +280,17 @@ def _list_metrics(how: Format, *, as_json: bool) -> None:
         click.echo(written(metrics_table(), how))
 
 
-def _check_arguments(rewards: Sequence[Path], pairs: Sequence[tuple[str, str]], *, ranks: bool) -> None:
+def _check_arguments(
+    demos: Sequence[Path], rewards: Sequence[Path], pairs: Sequence[tuple[str, str]], *, ranks: bool
+) -> None:
     """Refuse options that are invalid whatever the files hold."""
+    if not demos:
+        raise click.UsageError("Missing argument 'DEMOS...'.")
+    if len({*demos}) < len(demos):
+        raise click.UsageError("DEMOS: expected different files, found one twice.")
+    if ranks and len(demos) > 1:
+        raise click.UsageError("--ranks needs one file of demonstrations.")
+    refuse_unused("--reward", "samples", "error", "everything", used=bool(rewards))
     if ranks and len(rewards) != 1:
         raise click.UsageError("--ranks needs one --reward.")
     stems = [path.stem for path in rewards]

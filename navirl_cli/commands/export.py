@@ -14,6 +14,7 @@ from navirl_cli.commands.shared import (
     finish,
     force_option,
     json_option,
+    person_name_option,
     refuse_inputs,
     say,
     seed_option,
@@ -57,6 +58,7 @@ COUNT = 5
         help="A folder for Nav2, a log for viewers, or a table of the parameters in several conventions.",
     ),
 )
+@section("Reward", person_name_option)
 @scene_options
 @section(
     "Nav2",
@@ -92,7 +94,14 @@ COUNT = 5
     force_option,
 )
 def export(
-    reward: Path, target: str, output: Path | None, seed: int, as_json: bool, force: bool, **options: Any
+    reward: Path,
+    person_name: str | None,
+    target: str,
+    output: Path | None,
+    seed: int,
+    as_json: bool,
+    force: bool,
+    **options: Any,
 ) -> None:
     """Write a learnt reward for Nav2, for viewers, or in other conventions.
 
@@ -112,7 +121,7 @@ def export(
 
         refuse_inputs([output, *(output / name for name in FILES)], inputs)
         _check_folder(output, force=force)
-    learnt = read_reward(reward)
+    learnt = read_reward(reward, person_name)
     if output is None or target == "table":
         _to_table(learnt, where, output, as_json=as_json, force=force)
     elif target == "nav2":

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.artefacts.rewards import LearntReward, read_reward, read_reward_for, reward_document
+from navirl_cli.artefacts.persons import whose
+from navirl_cli.artefacts.rewards import read_prior_for, read_reward, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.cluster import workers_of
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     check_output,
@@ -37,8 +39,9 @@ from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import ASKED, FEW_DEMONSTRATIONS, Kind
+from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward, starting
-from navirl_cli.irl.selection import Steps, select
+from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
@@ -48,7 +51,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
     cls=Command,
     examples=[
         Example("One condition and cycle", "navirl fit demos.json --condition force --cycle 2 -o reward.json"),
-        Example("An earlier fit as prior", "navirl fit demos.json --cycle 2 --prior reward.json -o updated.json"),
+        Example("A typical reward and one for each person", "navirl fit demos.json --pool persons -o population.json"),
         Example(
             "Another reward",
             "navirl fit demos.json --cycle 2 --terms length,deviation,length-space -o reward.json",
@@ -74,6 +77,13 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         type=FilePath,
         help="Earlier reward file as a Gaussian prior, with its mean and covariance; without --init it also "
         "gives the initial values.",
+    ),
+    click.option(
+        "--person",
+        metavar="NAME",
+        shell_complete=completion.participants,
+        help="Learn the reward of this participant from the own demonstrations and --prior, a reward fitted with "
+        "--pool persons. The prior of a new person is how people are scattered, that of a known one the own reward.",
     ),
     click.option(
         "--pool",
@@ -136,11 +146,11 @@ def fit(
     terms: tuple[Term, ...],
     initial: str,
     prior_file: Path | None,
+    person: str | None,
     pool: str,
     l2: float,
     method: str,
-    conditions: tuple[str, ...],
-    cycle: int | None,
+    choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
     steps: str,
@@ -163,7 +173,7 @@ def fit(
     standard errors.
     """
     kind = None if intervals is None else Kind(intervals)
-    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool))
+    questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
     files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
@@ -172,49 +182,51 @@ def fit(
         _start(terms, given)  # refuses wrong words before the work
     everyone = demonstrations_in(demos)
     selected = select(
-        everyone,
-        conditions=conditions,
-        cycle=cycle,
+        of_participant(everyone, person),
+        choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),
         reach_m=reach,
     )
     chosen, evidence = selected.demonstrations, selected.evidence
-    earlier = None if prior_file is None else read_reward_for(prior_file, chosen)
+    earlier = None if prior_file is None else read_prior_for(prior_file, chosen, person)
     start = _start(terms, given) if earlier is None else starting(terms, given, earlier.reward)
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
-    plain = _learn(evidence, start, earlier, l2, Method(method))
+    plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
     effect = reach_effect(chosen, plain, Steps(steps), reach)
     with workers_of(workers, cluster) as executor:
         whole = Steps(steps) is Steps.ALL
+        others = None if earlier is None else earlier.others
         found, analyses, lost = answers(
-            evidence, plain, questions, whole_paths=whole, executor=executor, bars=progress_bar
+            evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
         )
     document = reward_document(
         found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
     )
+    if person is not None and earlier is not None:
+        document |= whose(person, earlier.participants)
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=conditions, everyone=everyone)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
     for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
         say(line)
     finish(lost)
 
 
-def _learn(evidence: Evidence, start: Reward, earlier: LearntReward | None, l2: float, method: Method) -> Fit:
+def _learn(evidence: Evidence, start: Reward, prior: Prior | None, l2: float, method: Method) -> Fit:
     """The fit, with a progress bar."""
     with progress_bar("fit") as update:
         return fit_reward(
             evidence,
             start,
             l2,
-            prior=None if earlier is None else earlier.as_prior(),
+            prior=prior,
             method=method,
             progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
         )

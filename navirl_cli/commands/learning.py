@@ -6,23 +6,14 @@ from typing import Any
 import click
 
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import choice_options
 from navirl_cli.commands.types import Choice, Number, Terms
 from navirl_cli.commands.usage import Function, section
-from navirl_cli.demos.demonstration import Condition
 from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.selection import Steps
 
-#: Which demonstrations and steps a reward is learnt from.
-selection_options = section(
+_steps_options = section(
     "Demonstrations",
-    click.option(
-        "--condition",
-        "conditions",
-        multiple=True,
-        type=Choice([condition.value for condition in Condition]),
-        help="Use trials of this condition only; repeatable.",
-    ),
-    click.option("--cycle", type=int, help="Use trials of this cycle only."),
     click.option(
         "--truncated", is_flag=True, help="Also use trials that are cut off, which extract --keep-truncated kept."
     ),
@@ -42,6 +33,13 @@ selection_options = section(
         "people pushed]",
     ),
 )
+
+
+def selection_options(function: Function) -> Function:
+    """Which demonstrations and steps a reward is learnt from; those of :func:`choice_options` as ``choosing``."""
+    return choice_options(reward=False)(_steps_options(function))
+
+
 l2_option = click.option(
     "--l2",
     default=PAPER_L2,

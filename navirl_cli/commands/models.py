@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from navirl_cli.cluster import workers_of
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.learning import l2_option, selection_options, terms_option
 from navirl_cli.commands.shared import (
     demonstrations_in,
@@ -52,8 +53,7 @@ from navirl_cli.reports.models import models_document, models_lost, models_remar
 @section("Output", json_option)
 def models(
     demos: Path,
-    conditions: tuple[str, ...],
-    cycle: int | None,
+    choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
     steps: str,
@@ -72,8 +72,7 @@ def models(
         raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
         demonstrations_in(demos),
-        conditions=conditions,
-        cycle=cycle,
+        choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
         steps=Steps(steps),

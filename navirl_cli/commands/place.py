@@ -1,15 +1,19 @@
 """Where to plan: the options of the section Scene, and the planning problem that they name."""
 
 from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from navirl_cli.artefacts.rewards import LearntReward, check_cells
-from navirl_cli.commands.shared import demonstrations_in
+from navirl_cli.commands.choosing import NAMES as CHOICE_NAMES
+from navirl_cli.commands.choosing import Choosing, choice_options
+from navirl_cli.commands.shared import demonstrations_in, say
 from navirl_cli.commands.types import FilePath, Number, Point, Pose
-from navirl_cli.commands.usage import section
+from navirl_cli.commands.usage import Function, refuse_unused, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import ROBOT_RADIUS_M
 from navirl_cli.errors import ArtefactError, LogError, unknown
@@ -17,10 +21,11 @@ from navirl_cli.errors import ArtefactError, LogError, unknown
 if TYPE_CHECKING:
     from navirl_cli.planning.problem import Problem
 
-#: The options of :class:`Place`.
-scene_options = section(
+_scene_options = section(
     "Scene",
-    click.option("--scene", metavar="DEMOS[:TRIAL]", help="Scene of a demonstration, by default of the first one."),
+    click.option(
+        "--scene", metavar="DEMOS[:TRIAL]", help="Scene of a demonstration, by default of the first chosen one."
+    ),
     click.option("--log", type=FilePath, help="Map, people, pose and goal of a recording."),
     click.option("--at", type=Number(min=0), help="Time in the log, s from its first pose.  [default: the first goal]"),
     click.option("--map", "map_file", type=FilePath, help="Nav2 map YAML beside its pgm or png."),
@@ -33,10 +38,25 @@ scene_options = section(
 )
 
 
+def scene_options(function: Function) -> Function:
+    """The options of :class:`Place`; those of :func:`choice_options` choose among the demonstrations of ``--scene``."""
+
+    @wraps(function)
+    def packed(scene: str | None, robot_radius: float | None, **others: Any) -> Any:
+        source = click.get_current_context().get_parameter_source("robot_radius")
+        if scene is not None and source is ParameterSource.DEFAULT_MAP:
+            robot_radius = None
+            say("`robot_radius` is that of the scene, with which its paths were extracted, not that of navirl.toml")
+        return function(scene=scene, robot_radius=robot_radius, **others)
+
+    return choice_options(reward=True, title="Scene")(_scene_options(packed))  # type: ignore[return-value]
+
+
 @dataclass(frozen=True)
 class Place:
     """Where to plan: options of the section Scene."""
 
+    choosing: Choosing
     scene: str | None
     log: Path | None
     at: float | None
@@ -48,6 +68,7 @@ class Place:
 
     def check(self) -> None:
         """Refuse options that exclude each other, or that name no scene."""
+        refuse_unused("--scene DEMOS", *CHOICE_NAMES, used=self.scene is not None)
         others = [self.log, self.map_file, self.start, self.goal, self.robot_radius, self.at, *self.people]
         if self.scene is not None and any(one is not None for one in others):
             raise click.UsageError("--scene gives map, people, start and goal; leave out the others.")
@@ -75,7 +96,7 @@ class Place:
 
         path, trial = self._demos_and_trial
         if path is not None:
-            return problem_of(_demonstration(learnt, path, trial))
+            return problem_of(self._demonstration(learnt, path, trial))
         if self.log is not None:
             return self._of_log(learnt, self.log)
         if self.map_file is None or self.start is None or self.goal is None:
@@ -89,7 +110,20 @@ class Place:
             NavirlError: As in :meth:`problem`.
         """
         path, trial = self._demos_and_trial
-        return None if path is None else _demonstration(learnt, path, trial)
+        return None if path is None else self._demonstration(learnt, path, trial, quiet=True)
+
+    def _demonstration(self, learnt: LearntReward, path: Path, trial: str, *, quiet: bool = False) -> Demonstration:
+        """A trial in a file, or the first chosen one."""
+        demonstrations = demonstrations_in(path)
+        if trial:
+            known = {one.id: one for one in self.choosing.subset.of(demonstrations)}
+            if trial not in known:
+                raise ArtefactError(f"{path}: {unknown('trial', trial, known)}")
+            one = known[trial]
+        else:
+            one = self.choosing.scene_of(demonstrations, [learnt], quiet=quiet)[0]
+        check_cells(learnt, [one], str(path))
+        return one
 
     @property
     def _demos_and_trial(self) -> tuple[Path | None, str]:
@@ -130,17 +164,6 @@ class Place:
     def radius_m(self, declared_m: float | None) -> float:
         """Radius of the robot: the user's, the log's, or the one that extract assumes."""
         return next(one for one in (self.robot_radius, declared_m, ROBOT_RADIUS_M) if one is not None)
-
-
-def _demonstration(learnt: LearntReward, path: Path, trial: str) -> Demonstration:
-    """A trial in a file, or its first one."""
-    demonstrations = demonstrations_in(path)
-    known = {one.id: one for one in demonstrations}
-    if trial and trial not in known:
-        raise ArtefactError(f"{path}: {unknown('trial', trial, known)}")
-    one = known[trial] if trial else demonstrations[0]
-    check_cells(learnt, [one], str(path))
-    return one
 
 
 def _pose(start: tuple[float, ...]) -> tuple[tuple[float, float], float | None]:

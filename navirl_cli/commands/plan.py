@@ -15,6 +15,7 @@ from navirl_cli.commands.shared import (
     force_option,
     json_option,
     output_option,
+    person_name_option,
     say,
     seed_option,
 )
@@ -53,6 +54,7 @@ def _check_arguments(where: Place, mode: str, count: int | None, tolerance: floa
     ],
 )
 @click.argument("reward", type=FilePath)
+@section("Reward", person_name_option)
 @scene_options
 @section(
     "Path",
@@ -88,6 +90,7 @@ def _check_arguments(where: Place, mode: str, count: int | None, tolerance: floa
 )
 def plan(
     reward: Path,
+    person_name: str | None,
     mode: str,
     count: int | None,
     seed: int,
@@ -118,7 +121,7 @@ def plan(
     for path in (output, figure):
         if path is not None:
             check_output(path, inputs, force=force)
-    learnt = read_reward(reward)
+    learnt = read_reward(reward, person_name)
     planner = Planner(where.problem(learnt), learnt.reward)
     if recommend:
         _recommend(learnt, planner.problem, seed)

@@ -1,12 +1,14 @@
 """``navirl report``: one page on demonstrations and the reward learnt from them."""
 
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 
-from navirl_cli.artefacts.rewards import read_reward_for
+from navirl_cli.artefacts.rewards import check_cells, learnt_of, reward_content
 from navirl_cli.artefacts.store import read_json
+from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
     demonstrations_in,
@@ -14,12 +16,14 @@ from navirl_cli.commands.shared import (
     finish,
     force_option,
     output_option,
+    person_option,
     progress_bar,
     samples_option,
     seed_option,
 )
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.files import Input, replacing
 
@@ -33,9 +37,19 @@ from navirl_cli.files import Input, replacing
 )
 @demos_argument
 @click.argument("reward", type=FilePath)
-@section("Learnt paths", samples_option(), seed_option)
+@choice_options(reward=True)
+@section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
-def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, force: bool) -> None:
+def report(
+    demos: Path,
+    reward: Path,
+    choosing: Choosing,
+    person: str | None,
+    output: Path,
+    samples: int,
+    seed: int,
+    force: bool,
+) -> None:
     """Write one self-contained HTML page on demonstrations and the reward learnt from them.
 
     The page has the parameters with intervals and their meaning in metres, warnings, metrics of driven and learnt
@@ -50,11 +64,15 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
     from navirl_cli.figures.report import draw_report
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
+    from navirl_cli.reports.made import Made, changed_settings, subset_words
     from navirl_cli.reports.reward import METRICS, report_of
 
     check_output(output, [demos, reward], force=force)
-    demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations)
+    everyone = demonstrations_in(demos)
+    content = reward_content(reward, person)
+    learnt = learnt_of(content, str(reward))
+    check_cells(learnt, everyone, str(reward))
+    demonstrations = choosing.of(everyone, [learnt])
     rng = np.random.default_rng(seed)
     with progress_bar("evaluate", len(demonstrations)) as update:
         result = compare(
@@ -72,11 +90,15 @@ def report(demos: Path, reward: Path, output: Path, samples: int, seed: int, for
         figures = draw_report(
             demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
         )
-        made_from = [*read_json(demos, "demonstrations")["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
-        content = report_of(
-            demonstrations, learnt, read_json(reward, "reward"), result, ranked, figures, made_from, seed
-        )
-        page = to_html(content)
+        extracted = read_json(demos, "demonstrations")
+        made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        logs = tuple(one["file"] for one in extracted["inputs"])
+        changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
+        asked = [*subset_words(choosing.subset), *(["--all"] if choosing.everything else [])]
+        asked += ["--person", person] if person is not None else []
+        asked += ["--samples", str(samples), "--seed", str(seed)]
+        made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
+        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)

@@ -4,7 +4,9 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import click
@@ -12,7 +14,7 @@ import click
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.commands import completion
 from navirl_cli.commands.types import Choice, Count, FilePath, LogPath, OutputPath, Point, RoleTopic
-from navirl_cli.commands.usage import Function, as_options, section
+from navirl_cli.commands.usage import Function, as_options, is_quiet, is_verbose, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.inline import printable
@@ -23,12 +25,28 @@ from navirl_cli.remote import Remote
 #: As :data:`navirl_cli.evaluation.drawn.MOST`, which is not imported before paths are sampled.
 MOST_SAMPLES = 100_000
 
+#: Between lines of progress without a terminal, s.
+EVERY_S = 2.0
+
 force_option = click.option("--force", is_flag=True, help="Replace existing files.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
 demos_argument = click.argument("demos", type=FilePath)
+person_option = click.option(
+    "--person",
+    metavar="NAME",
+    shell_complete=completion.persons,
+    help="Take this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
+)
+#: The same beside positions of people, which --person names there.
+person_name_option = click.option(
+    "--person-name",
+    metavar="NAME",
+    shell_complete=completion.persons,
+    help="Drive by this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
+)
 logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=LogPath())
 topic_option = click.option(
     "--topic",
@@ -159,7 +177,13 @@ def echo_json(document: Any) -> None:
 
 
 def say(line: str) -> None:
-    """A diagnostic on stderr, with options where it names arguments."""
+    """A remark on stderr, with options where it names arguments; none with --quiet."""
+    if not is_quiet():
+        complain(line)
+
+
+def complain(line: str) -> None:
+    """A line on stderr also with --quiet: what is lost."""
     click.echo(f"navirl: {printable(' '.join(as_options(line).split()))}", err=True)
 
 
@@ -185,7 +209,7 @@ def _listed(names: Sequence[str]) -> str:
 def finish(lost: Sequence[str]) -> None:
     """List lost or skipped data and exit with 3; return if there is none."""
     for line in lost:
-        say(line)
+        complain(line)
     if lost:
         click.get_current_context().exit(3)
 
@@ -200,7 +224,7 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
     Yields:
         A function that takes the bytes done, the total bytes and, if it likes, a short text.
     """
-    if not sys.stderr.isatty():
+    if is_quiet() or not sys.stderr.isatty():
         yield lambda _done, _total, _word="": None
         return
     with _finished(
@@ -217,18 +241,19 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[int, str], None]]:
+def progress_bar(label: str, length: int | None = None, *, lines: bool = False) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, if stderr is a terminal.
 
     Args:
         label: The present work.
         length: Number of steps, or None if it is not known.
+        lines: Whether to print a line for each step elsewhere: for work of minutes.
 
     Yields:
         A function that takes the number of steps done and a short text on the present one.
     """
-    if not sys.stderr.isatty():
-        yield lambda _done, _word: None
+    if is_quiet() or not sys.stderr.isatty():
+        yield _by_lines(label, length, every_s=0.0 if lines else EVERY_S if is_verbose() else inf)
         return
     steps = None if length is not None else iter(int, 1)
     new = click.progressbar(
@@ -240,6 +265,19 @@ def progress_bar(label: str, length: int | None = None) -> Iterator[Callable[[in
             bar.update(max(0, done - bar.pos), word)
 
         yield update
+
+
+def _by_lines(label: str, length: int | None, every_s: float) -> Callable[[int, str], None]:
+    """Progress as lines, at most one in a time, and one at the end; none where the time is infinite."""
+    last = -every_s
+
+    def update(done: int, word: str) -> None:
+        nonlocal last
+        if every_s < inf and (done == length or monotonic() - last >= every_s):
+            last = monotonic()
+            say(f"{label} {done}" + ("" if length is None else f" of {length}") + (f": {word}" if word else ""))
+
+    return update
 
 
 @contextmanager

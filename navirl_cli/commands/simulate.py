@@ -13,7 +13,7 @@ from navirl_cli.commands.shared import (
     progress_bar,
     seed_option,
 )
-from navirl_cli.commands.types import Choice, Count, Number
+from navirl_cli.commands.types import Choice, Count, FilePath, Number
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.tables import written
 
@@ -30,6 +30,12 @@ from navirl_cli.documents.tables import written
     "Simulation",
     click.option("--participants", default=3, show_default=True, type=Count(1, 99), help="Number of participants."),
     seed_option,
+    click.option(
+        "--drive",
+        type=FilePath,
+        help="Path that the robot drives, .csv or .json of navirl plan: two trials in which the person may push, and "
+        "one in which nobody does.  [default: the two cycles of the study]",
+    ),
 )
 @section(
     "People",
@@ -45,8 +51,8 @@ from navirl_cli.documents.tables import written
         default=0.0,
         show_default=True,
         type=Number(0, 1000),
-        help="People start to intervene only where the robot's path displeases them by more than this: the logarithm "
-        "of how much rarer paths of their own reward pass there than beside it, nats.",
+        help="People start to intervene only where the robot's path displeases them by more than this, nats: the "
+        "logarithm of how many times more often a policy of their own reward visits the best place beside them.",
     ),
     click.option("--delay", default=0.25, show_default=True, type=Number(0, 5), help="Reaction time, s."),
     click.option(
@@ -68,6 +74,7 @@ from navirl_cli.documents.tables import written
 def simulate(
     participants: int,
     seed: int,
+    drive: Path | None,
     reach: float,
     tolerance: float,
     delay: float,
@@ -81,16 +88,21 @@ def simulate(
 
     Each participant has a reward of their own, drawn around the published one, and pushes the robot toward paths that
     are sampled from it: two trials, a fit, two trials along learnt paths, two trials with a joystick, one trial with
-    obstacle avoidance. The metadata record navirl.truth holds the true rewards, paths and forces, and the options of
-    people that differ from their defaults; no other command reads it.
+    obstacle avoidance. With --drive the robot drives a given path instead, past the same people for the same seed. The
+    metadata record navirl.truth holds the true rewards, paths and forces, and the options of people that differ from
+    their defaults; no other command reads it.
     """
+    from navirl_cli.artefacts.plans import read_line
     from navirl_cli.reports.logs import simulated_table
     from navirl_cli.simulation.behaviour import Behaviour, Joystick
     from navirl_cli.simulation.log import write_logs
 
+    driven_m = None if drive is None else read_line(drive)
     behaviour = Behaviour(reach, tolerance, delay, scatter, Joystick(joystick))
     with progress_bar("simulate", participants) as update:
-        logs = write_logs(output, participants, seed, force=force, behaviour=behaviour, progress=update)
+        logs = write_logs(
+            output, participants, seed, force=force, behaviour=behaviour, driven_m=driven_m, progress=update
+        )
     table = simulated_table(logs)
     if as_json:
         echo_json({"logs": table.records()})

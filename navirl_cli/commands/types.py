@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from os import fsdecode, sep
+from os.path import isdir
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,8 @@ class FileOrFolder(click.Path):
         if isinstance(value, Output):
             return value
         text = fsdecode(super().convert(value, param, ctx))
-        return Output(Path(text), text.endswith(("/", sep)) or Path(text).is_dir())
+        is_folder = isdir(text)  # noqa: PTH112 no folder has a name that is too long, which is_dir raises
+        return Output(Path(text), text.endswith(("/", sep)) or is_folder)
 
 
 class Choice(click.Choice[str]):

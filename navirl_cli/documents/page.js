@@ -64,10 +64,12 @@ for (const image of document.querySelectorAll("figure img")) {
   button.type = "button";
   button.className = "enlarge";
   button.title = "Enlarge";
-  image.replaceWith(button);
-  button.append(image);
+  const whole = image.closest("picture") ?? image;
+  whole.replaceWith(button);
+  button.append(whole);
   button.addEventListener("click", () => {
-    enlarged.src = image.src;
+    enlarged.src = image.currentSrc || image.src;
+    dialog.style.background = getComputedStyle(image).backgroundColor;
     enlarged.alt = image.alt;
     dialog.setAttribute("aria-label", image.alt);
     dialog.showModal();

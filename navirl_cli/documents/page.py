@@ -9,7 +9,7 @@ from html import escape
 from importlib.resources import files
 from struct import unpack
 
-from navirl_cli.documents.document import PNG_HEAD, Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.document import PNG_HEAD, Block, Bullets, Heading, Paragraph, Picture, Report, read_picture
 from navirl_cli.documents.inline import html_of, plain_of
 from navirl_cli.documents.tables import MINUS, Cell, Table, is_missing, sort_key
 
@@ -157,13 +157,23 @@ def _sort_key(cell: Cell) -> str:
 
 
 def _picture(picture: Picture) -> str:
-    """A picture, embedded, with its caption."""
-    media_type, content = picture.read()
+    """A picture, embedded, with its caption; with others for dark and for narrow screens if there are any."""
+    image = f'<img src="{{}}" alt="{escape(picture.alternative)}"{{}}>'.format(*_embedded(*picture.read()))
+    sources = [
+        '<source media="{}" srcset="{}"{}>'.format(query, *_embedded(*read_picture(path)))
+        for query, path in picture.others
+    ]
+    if sources:
+        image = f"<picture>\n{_lines([*sources, image])}\n</picture>"
+    caption = f"\n<figcaption>{html_of(picture.caption)}</figcaption>" if picture.caption else ""
+    return f"<figure>\n{image}{caption}\n</figure>"
+
+
+def _embedded(media_type: str, content: bytes) -> tuple[str, str]:
+    """A picture as an address, and the attributes of its size."""
     size = _shown_size(content)
     attributes = f' width="{size[0]}" height="{size[1]}"' if size else ""
-    source = f"data:{media_type};base64,{b64encode(content).decode()}"
-    caption = f"\n<figcaption>{html_of(picture.caption)}</figcaption>" if picture.caption else ""
-    return f'<figure>\n<img src="{source}" alt="{escape(picture.alternative)}"{attributes}>{caption}\n</figure>'
+    return f"data:{media_type};base64,{b64encode(content).decode()}", attributes
 
 
 def _shown_size(content: bytes) -> tuple[int, int] | None:

@@ -1,23 +1,20 @@
 """Demonstrated paths beside learnt ones and beside paths that do not depend on people's wishes."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.drawn import Drawn, Precision, Shown, draw, expected_of
+from navirl_cli.evaluation.drawn import Drawn, Precision, Shown, draw, expected_here, expected_of
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
 from navirl_cli.evaluation.lines import Lines
-from navirl_cli.evaluation.metrics import NO_REWARD, PAPER_METRICS, Metric, measure, missing_of
-from navirl_cli.evaluation.motion import Drive
+from navirl_cli.evaluation.metrics import NO_REWARD, PAPER_METRICS, Metric, Values, measure, missing_of
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M, Drive
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
-
-#: Radius of a standing person as an obstacle, m.
-PERSON_RADIUS_M = 0.25
 
 DRIVEN, ON_GRID, LEARNT, NOMINAL, AVOIDANCE = "driven", "driven, on grid", "learnt", "nominal", "avoidance"
 #: The types of paths, in the order of the tables; several rewards have "learnt, NAME" each.
@@ -84,18 +81,73 @@ def compare(
         if progress is not None:
             progress(number + 1, len(demonstrations))
     groups: list[GroupMetrics] = []
+    learnt: list[dict[str, Values]] = [{} for _ in rows]
     for group in by_group(demonstrations, fields):
         own = [number for number, row in enumerate(rows) if row.group == group]
         path_types = dict.fromkeys(path_type for number in own for path_type in rows[number].values)
         found = {path_type: summary_of(group, path_type, [rows[number] for number in own]) for path_type in path_types}
         for name in rewards:
             members = [(drawn[name, where[number]], where[number].numbers.index(number)) for number in own]
-            path_type = LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
+            path_type = learnt_type(name, rewards)
             found[path_type] = expected_of(group, path_type, members, metrics)
+            for number, (paths, place) in zip(own, members, strict=True):
+                learnt[number][path_type] = expected_here(paths, place, metrics)
         ordered = sorted(found.values(), key=lambda row: (_place(row.path_type), row.path_type))
         groups += [row for row in ordered if row.mean]
     missing = {metric.name: NO_REWARD for metric in metrics if metric.near is not None and not rewards}
+    rows = [replace(row, values={**row.values, **own}) for row, own in zip(rows, learnt, strict=True)]
     return Comparison(tuple(groups), tuple(rows), tuple(notes), missing)
+
+
+def learnt_type(name: str, rewards: Collection[str]) -> str:
+    """The type of the paths of one of several rewards."""
+    return LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
+
+
+def compare_files(
+    files: Mapping[str, Sequence[Demonstration]],
+    rewards: Mapping[str, Reward],
+    precision: Precision,
+    rng: np.random.Generator,
+    *,
+    metrics: Sequence[Metric] = PAPER_METRICS,
+    fields: Collection[str] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Comparison:
+    """Measure the demonstrations of several files, as :func:`compare` does those of one.
+
+    Args:
+        files: Demonstrations by the name of their file. Of several files, names of groups and ids begin with it, as
+            :func:`name_in` says.
+        rewards: As of :func:`compare`; so are the other arguments.
+        precision: How many paths to draw.
+        rng: Source of randomness.
+        metrics: To compute.
+        fields: To group by.
+        progress: Called with demonstrations done and in all.
+    """
+    found = []
+    done, count = 0, sum(map(len, files.values()))
+    for name, own in files.items():
+        update = None if progress is None else (lambda n, _all, done=done: progress(done + n, count))
+        one = compare(own, rewards, precision, rng, metrics=metrics, fields=fields, progress=update)
+        done += len(own)
+        groups = tuple(replace(row, group=name_in(files, name, row.group)) for row in one.groups)
+        rows = tuple(
+            replace(row, group=name_in(files, name, row.group), id=name_in(files, name, row.id)) for row in one.rows
+        )
+        found.append(Comparison(groups, rows, tuple(name_in(files, name, note) for note in one.notes), one.missing))
+    return Comparison(
+        tuple(row for one in found for row in one.groups),
+        tuple(row for one in found for row in one.rows),
+        tuple(note for one in found for note in one.notes),
+        found[0].missing,
+    )
+
+
+def name_in(files: Collection[str], file: str, name: str) -> str:
+    """The name of a group or a trial of one of several files; of one file alone the name itself."""
+    return f"{file}: {name}" if len(files) > 1 else name
 
 
 def _place(path_type: str) -> int:

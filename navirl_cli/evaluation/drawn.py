@@ -116,6 +116,26 @@ def _needed(values: Sequence[FloatArray], error: float) -> int:
     return min(needed, MOST)
 
 
+def expected_here(drawn: Drawn, place: int, metrics: Sequence[Metric]) -> dict[str, float]:
+    """Expected values of one demonstration's learnt paths, exact where visits give them; NaN where none exists.
+
+    Args:
+        drawn: Its learnt paths.
+        place: Its place among the demonstrations that share them.
+        metrics: That were asked for.
+    """
+    found = {}
+    for metric in metrics:
+        if metric.name in drawn.exact:
+            found[metric.name] = drawn.exact[metric.name]
+        elif metric.drive is None:
+            own = drawn.values.get(metric.name, np.empty((1, 0)))
+            known = own[place if metric.near is not None and len(own) > place else 0]
+            known = known[np.isfinite(known)]
+            found[metric.name] = float(known.mean()) if len(known) else float("nan")
+    return found
+
+
 def expected_of(
     group: str, path_type: str, members: Sequence[tuple[Drawn, int]], metrics: Sequence[Metric]
 ) -> GroupMetrics:

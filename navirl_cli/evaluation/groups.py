@@ -1,24 +1,18 @@
 """Groups of demonstrations: who belongs to which, and mean and spread over a group or over participants."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
+from navirl_cli.demos.subset import FIELDS
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.evaluation.metrics import Values
 
 #: Of all intervals.
 LEVEL = 0.95
-#: By what demonstrations can be grouped.
-FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
-    "condition": lambda one: one.condition.value,
-    "cycle": lambda one: "no cycle" if one.cycle is None else f"cycle {one.cycle}",
-    "set": lambda one: one.set or "main task",
-    "participant": lambda one: one.participant,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +157,42 @@ def summary_of(group: str, path_type: str, rows: Iterable[Measured]) -> GroupMet
     return GroupMetrics(
         group, path_type, len(paths), mean, std, half_interval=half, participants=people, missing=missing
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Quantiles(ByContent):
+    """Quantiles of the paths of one type in one group."""
+
+    group: str
+    path_type: str
+    #: Number of demonstrations.
+    count: int
+    #: By share: a value by metric; NaN where no demonstration has one.
+    values: Mapping[float, Values]
+
+
+def quantiles_of(rows: Sequence[Measured], names: Sequence[str], shares: Sequence[float]) -> list[Quantiles]:
+    """Quantiles over demonstrations, linear between their values; of learnt paths over their expected values.
+
+    Args:
+        rows: What was measured.
+        names: Of metrics.
+        shares: From 0 to 1.
+    """
+    found = []
+    for group in dict.fromkeys(row.group for row in rows):
+        own = [row for row in rows if row.group == group]
+        for path_type in dict.fromkeys(path_type for row in own for path_type in row.values):
+            there = [row.values[path_type] for row in own if path_type in row.values]
+            values = {name: np.array([one[name] for one in there if name in one], dtype=float) for name in names}
+            known = {name: one[np.isfinite(one)] for name, one in values.items() if len(one)}
+            by_share = {share: {name: _quantile(one, share) for name, one in known.items()} for share in shares}
+            found.append(Quantiles(group, path_type, len(there), by_share))
+    return found
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    return float(np.quantile(values, share)) if len(values) else float("nan")
 
 
 def by_participant(rows: Iterable[Measured], path_type: str, name: str) -> dict[str, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.evaluation.lines import LEAVES_M, Lines, zone_text
-from navirl_cli.evaluation.motion import Drive
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M, STILL_M_S, Drive
 from navirl_cli.evaluation.policy_paths import Nearness, Visits
 from navirl_cli.evaluation.segments import ZONES
 
@@ -109,6 +109,7 @@ class Metric:
 
 _PAPER = "Kollmitz et al., IROS 2020, Fig. 7"
 _HALL = "zones: Hall, The Hidden Dimension, 1966"
+_FRANCIS = "Francis et al., Principles and Guidelines for Evaluating Social Robot Navigation Algorithms, 2023"
 _HUNAV = "Perez-Higueras et al., HuNavSim, 2023"
 #: When smoothed derivatives do not exist.
 _SHORT = "shorter than 1.1 s"
@@ -181,6 +182,43 @@ def _zone_metrics() -> list[Metric]:
             ),
             Metric(f"{zone}_s", time_label, "s", f"time during which {where}", _HALL, times, drive=time),
         ]
+    return [*found, *_intrusions()]
+
+
+def _intrusions() -> list[Metric]:
+    """Share of the time in zones near people, and how often they were entered."""
+    found = []
+    for number, (zone, limit_m) in enumerate(ZONES[:-1]):
+
+        def share(drive: Drive, number: int = number) -> float:
+            return float(drive.zones_s[number]) / drive.duration_s
+
+        def entries(drive: Drive, number: int = number) -> float:
+            return float(drive.intrusions(number))
+
+        needs = (Need.TIMES, Need.PEOPLE)
+        where = f"the robot's shell is {zone_text(number)} from the nearest person's centre"
+        near = f"the distance of the robot's shell from the nearest person's centre fell below {limit_m:g} m"
+        found += [
+            Metric(
+                f"{zone}_time_share",
+                f"time share in {zone} zone",
+                "1",
+                f"share of the time during which {where}",
+                f"{_HUNAV} (there in per cent)",
+                needs,
+                drive=share,
+            ),
+            Metric(
+                f"{zone}_intrusions",
+                f"intrusions into {zone} zone",
+                "1",
+                f"how often {near}, or was below at the start",
+                "counted as in navmet (Okal), over time",
+                needs,
+                drive=entries,
+            ),
+        ]
     return found
 
 
@@ -247,6 +285,27 @@ METRICS: tuple[Metric, ...] = (
         "time from the first pose to the last",
         needs=(Need.TIMES,),
         drive=lambda drive: drive.duration_s,
+    ),
+    Metric(
+        "not_moving_s",
+        "time not moving",
+        "s",
+        f"time during which the smoothed speed is below {STILL_M_S:g} m/s; turning on the spot counts",
+        f"{_FRANCIS}; {_HUNAV}",
+        (Need.TIMES,),
+        drive=lambda drive: drive.not_moving_s,
+        undefined=_SHORT,
+    ),
+    Metric(
+        "time_to_collision_s",
+        "time to collision",
+        "s",
+        "least time, over the drive and all people, after which the robot's shell and a person of radius "
+        f"{PERSON_RADIUS_M:g} m would touch if both kept their velocity, smoothed over 1.1 s; 0 where they touch",
+        _FRANCIS,
+        (Need.TIMES, Need.PEOPLE),
+        drive=lambda drive: drive.time_to_collision_s,
+        undefined=f"never on a course to collide, or {_SHORT}",
     ),
     Metric(
         "speed_m_s",

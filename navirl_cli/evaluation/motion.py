@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
-from navirl_cli.demos.demonstration import Contact, Demonstration
+from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.demos.demonstration import Contact, Demonstration, PersonTrack
 from navirl_cli.evaluation.segments import ZONES
 
 #: Positions are resampled at this rate, Hz, and smoothed by cubics over so many samples (1.1 s): derivatives of noisy
@@ -14,6 +14,10 @@ from navirl_cli.evaluation.segments import ZONES
 RATE_HZ, WINDOW = 10.0, 11
 #: Time near people is sampled in steps of this, s.
 STEP_S = 0.02
+#: Radius of a standing person as an obstacle, m.
+PERSON_RADIUS_M = 0.25
+#: A robot that is slower does not move, m/s: what noise of positions leaves after smoothing.
+STILL_M_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +49,51 @@ class Drive:
     @cached_property
     def zones_s(self) -> FloatArray:
         """(4,) time in each of ZONES, s; needs people."""
+        zone, count = self._zone, len(self._zone)
+        inside: FloatArray = np.bincount(zone, minlength=len(ZONES))[: len(ZONES)] * self.duration_s / count
+        return inside
+
+    def intrusions(self, number: int) -> int:
+        """How often the robot entered a zone of ZONES or a nearer one, or began in it; needs people."""
+        inside = self._zone <= number
+        return int(inside[0]) + int((inside[1:] & ~inside[:-1]).sum())
+
+    @cached_property
+    def _zone(self) -> IntArray:
+        """(k,) number of the zone of ZONES at equal steps of about STEP_S."""
         d = self.demonstration
         count = max(1, round(d.duration_s / STEP_S))
         at = (np.arange(count) + 0.5) / count * d.duration_s + d.t_s[0]
         x, y = (np.interp(at, d.t_s, axis) for axis in d.xy_m.T)
         distance = np.min([np.hypot(x - person[0], y - person[1]) for person in d.people_m], axis=0) - d.robot_radius_m
         limits = np.array([limit for _, limit in ZONES])
-        zone = (distance[:, None] >= limits).sum(axis=1)
-        inside: FloatArray = np.bincount(zone, minlength=len(ZONES))[: len(ZONES)] * d.duration_s / count
-        return inside
+        zone: IntArray = (distance[:, None] >= limits).sum(axis=1)
+        return zone
+
+    @property
+    def not_moving_s(self) -> float:
+        """Time slower than STILL_M_S, s; NaN as for the speed."""
+        speed = np.hypot(*self._rates[0].T)
+        return float((speed < STILL_M_S).mean()) * self.duration_s if np.isfinite(speed).all() else float("nan")
+
+    @property
+    def time_to_collision_s(self) -> float:
+        """Least time after which robot and a person would touch if both kept their velocity, s; needs people.
+
+        0 where they touch already; NaN where they never move towards a touch, and as for the speed.
+        """
+        d, velocity = self.demonstration, self._rates[0]
+        if not np.isfinite(velocity).all():
+            return float("nan")
+        at = d.t_s[0] + np.arange(len(velocity)) / RATE_HZ
+        robot = np.stack([np.interp(at, d.t_s, axis) for axis in d.xy_m.T], axis=1)
+        tracks = d.tracks or (None,) * len(d.people_m)
+        least = [
+            touching_s(robot - there, velocity - own, d.robot_radius_m + PERSON_RADIUS_M)
+            for there, own in (_moving(track, still, at) for track, still in zip(tracks, d.people_m, strict=True))
+        ]
+        found = float(np.min(least))
+        return found if np.isfinite(found) else float("nan")
 
     @property
     def contact_share(self) -> float:
@@ -93,6 +133,36 @@ class Drive:
     @cached_property
     def _rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         return derivatives(self.demonstration.t_s, self.demonstration.xy_m)
+
+
+def _moving(track: PersonTrack | None, still_m: FloatArray, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(k, 2) places, m, and velocities, m/s, of a person at times; before and after a track the person stands."""
+    if track is None or not len(track.t_s):
+        return np.broadcast_to(still_m, (len(at_s), 2)), np.zeros((len(at_s), 2))
+    there = np.stack([np.interp(at_s, track.t_s, axis) for axis in track.xy_m.T], axis=1)
+    return there, derivatives(at_s, there)[0][: len(at_s)]
+
+
+def touching_s(apart_m: FloatArray, velocity_m_s: FloatArray, radius_m: float) -> FloatArray:
+    """Time until two discs touch that keep their velocities.
+
+    Args:
+        apart_m: (k, 2) from one centre to the other, m.
+        velocity_m_s: (k, 2) rate of change of that, m/s.
+        radius_m: Sum of both radii, m.
+
+    Returns:
+        (k,) s: 0 where they touch, infinity where they will not.
+    """
+    # |p + v t|^2 = r^2: the smaller root, if the distance falls and gets so small
+    a = (velocity_m_s**2).sum(axis=1)
+    b = (apart_m * velocity_m_s).sum(axis=1)
+    c = (apart_m**2).sum(axis=1) - radius_m**2
+    meets = (b < 0) & (b**2 - a * c >= 0)
+    root = np.sqrt(np.where(meets, b**2 - a * c, 0.0))
+    later = np.where(meets, c / np.where(meets, -b + root, 1.0), np.inf)
+    times: FloatArray = np.where(c <= 0, 0.0, later)
+    return times
 
 
 def derivatives(t_s: FloatArray, xy_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,16 +1,17 @@
 """Two groups of paths compared within participants: difference, intervals, test and effect sizes."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError, unknown
-from navirl_cli.evaluation.compare import DRIVEN
-from navirl_cli.evaluation.groups import LEVEL, Measured, by_participant, mean_and_spread, student_half_width
+from navirl_cli.evaluation.compare import DRIVEN, Comparison, learnt_type, name_in
+from navirl_cli.evaluation.groups import LEVEL, Measured, by_group, by_participant, mean_and_spread, student_half_width
 from navirl_cli.evaluation.metrics import Metric
 
 RESAMPLES = 9999
@@ -38,6 +39,8 @@ class Paired(ByContent):
     #: Bootstrap interval of the mean (bias-corrected and accelerated); NaN below FEWEST pairs, None where it was not
     #: asked for.
     bootstrap: Interval | None = None
+    #: wilcoxon_p corrected for all tests of the same table of results; None for one test alone.
+    holm_p: float | None = None
 
     @property
     def n(self) -> int:
@@ -131,13 +134,92 @@ def pairs_of(
     for name in (one, other):
         if name not in groups:
             raise DemonstrationError(unknown("`pair`", name, groups))
+    return _of_paths((groups[one], DRIVEN), (groups[other], DRIVEN), metrics, rng)
+
+
+def _of_paths(
+    one: tuple[Sequence[Measured], str],
+    other: tuple[Sequence[Measured], str],
+    metrics: Sequence[Metric],
+    rng: np.random.Generator,
+) -> dict[str, Paired]:
+    """Compare rows' paths of one type with others, by metric."""
     found = {
-        metric.name: paired(
-            by_participant(groups[one], DRIVEN, metric.name), by_participant(groups[other], DRIVEN, metric.name), rng
-        )
+        metric.name: paired(by_participant(*one, metric.name), by_participant(*other, metric.name), rng)
         for metric in metrics
     }
     return {name: result for name, result in found.items() if result.n}
+
+
+def pairs_of_all(
+    result: Comparison,
+    asked: Sequence[tuple[str, str]],
+    files: Mapping[str, Sequence[Demonstration]],
+    rewards: Collection[str],
+    metrics: Sequence[Metric],
+    fields: Collection[str],
+    rng: np.random.Generator,
+) -> list[tuple[str, str, dict[str, Paired]]]:
+    """All comparisons: those asked for; of several files, the same groups; of several rewards, their learnt paths.
+
+    Args:
+        result: What was measured.
+        asked: Names of groups.
+        files: Demonstrations by the name of their file.
+        rewards: Their names.
+        metrics: To compare.
+        fields: That groups are by.
+        rng: Source of randomness.
+
+    Returns:
+        One, other, and by metric one minus other, with p-values corrected for the number of all tests.
+
+    Raises:
+        DemonstrationError: A group does not exist.
+    """
+    found = [(one, other, pairs_of(result.rows, one, other, metrics, rng)) for one, other in asked]
+    first, *later = files
+    for name in later:
+        both = [group for group in by_group(files[first], fields) if group in by_group(files[name], fields)]
+        named = [(name_in(files, name, group), name_in(files, first, group)) for group in both]
+        same = [(*pair, pairs_of(result.rows, *pair, metrics, rng)) for pair in named if pair not in asked]
+        found += [pair for pair in same if pair[2]]
+    if len(rewards) > 1:
+        of_learnt = [metric for metric in metrics if metric.drive is None]
+        one, *others = (learnt_type(name, rewards) for name in rewards)
+        for group in dict.fromkeys(row.group for row in result.rows):
+            rows = [row for row in result.rows if row.group == group]
+            for other in others:
+                own = _of_paths((rows, other), (rows, one), of_learnt, rng)
+                found.append((f"{group}: {other}", one, own))
+    return _corrected(found)
+
+
+def _corrected(pairs: Sequence[tuple[str, str, dict[str, Paired]]]) -> list[tuple[str, str, dict[str, Paired]]]:
+    """The same with p-values by Holm's method over all tests, where there are several."""
+    tests = [(number, name) for number, (_, _, own) in enumerate(pairs) for name in own]
+    if len(tests) < 2:
+        return list(pairs)
+    adjusted = holm(np.array([pairs[number][2][name].wilcoxon_p for number, name in tests]))
+    by_test = dict(zip(tests, adjusted, strict=True))
+    return [
+        (one, other, {name: replace(pair, holm_p=float(by_test[number, name])) for name, pair in own.items()})
+        for number, (one, other, own) in enumerate(pairs)
+    ]
+
+
+def holm(p_values: FloatArray) -> FloatArray:
+    """(k,) p-values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6 (1979)).
+
+    Args:
+        p_values: (k,), NaN where there was no test, which then does not count.
+    """
+    adjusted = np.full(len(p_values), np.nan)
+    known = np.flatnonzero(np.isfinite(p_values))
+    order = known[np.argsort(p_values[known], kind="stable")]
+    raised = np.maximum.accumulate(p_values[order] * np.arange(len(order), 0, -1))
+    adjusted[order] = np.minimum(raised, 1.0)
+    return adjusted
 
 
 def _bootstrap(values: FloatArray, rng: np.random.Generator) -> Interval:

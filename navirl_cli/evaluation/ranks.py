@@ -69,6 +69,13 @@ class GroupRanks:
         """The group, and whether its participants were held out."""
         return f"{self.group}, held out" if self.held_out else self.group
 
+    def uniformity(self) -> tuple[float, float]:
+        """Kolmogorov and Smirnov's distance of the ranks from the uniform, and its exact p-value."""
+        from scipy.stats import kstest
+
+        found = kstest([one.rank for one in self.ranks], "uniform")
+        return float(found.statistic), float(found.pvalue)
+
 
 def chosen_to_rank(
     demonstrations: Sequence[Demonstration], trained: Trained | None
@@ -227,11 +234,3 @@ def sampled_log_likelihoods(policy: Policy, paths: SampledPaths) -> FloatArray:
     moves = moves_along(policy.lattice.cells[paths.states])
     total: FloatArray = policy.log_likelihoods(paths.states, moves).sum(axis=1)
     return total
-
-
-def uniformity(ranks: Sequence[Rank]) -> tuple[float, float]:
-    """Kolmogorov and Smirnov's distance of ranks from the uniform, and its exact p-value."""
-    from scipy.stats import kstest
-
-    found = kstest([one.rank for one in ranks], "uniform")
-    return float(found.statistic), float(found.pvalue)

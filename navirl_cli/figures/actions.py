@@ -23,6 +23,8 @@ from navirl_cli.irl.scene import Scene
 #: Least distance between arrows, and width of a shaft, inches; length of the arrow of a certain move as a share of the
 #: distance between arrows.
 _PITCH_IN, _SHAFT_IN, _LENGTH = 0.085, 0.009, 0.95
+#: Below paths the arrows are so many times as far from each other, and have this opacity.
+_THINNED, _FAINT = 2.0, 0.5
 #: Width of the labels and the colour bar beside a map, inches.
 _BESIDE_IN = 0.85
 
@@ -48,7 +50,7 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
     """Draw the most likely move of a policy in every cell that is shown.
 
     The more probable the move, the longer and darker its arrow. Where cells are too small, only every second cell has
-    an arrow, or every third, and so on, along x and along y.
+    an arrow, or every third, and so on, along x and along y. Below paths the arrows are fewer and fainter.
 
     Args:
         axes: Where to draw.
@@ -66,7 +68,8 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
         expected = f"({scene.lattice.size}, {len(MOVES)})"
         raise ValueError(f"probabilities of moves need the shape {expected}, found {probability.shape}")
     window = options.get("window_m") or scene_window(scene, scene.nominal)
-    every = _stride(axes, scene, window)
+    over = any(one.lines_m for one in options.get("overlays", ()))
+    every = _stride(axes, scene, window, _PITCH_IN * (_THINNED if over else 1.0))
     start = scene.lattice.cells[scene.start]
     chosen = shown_states(scene, window) & ((scene.lattice.cells - start) % every == 0).all(axis=1)
     chosen[scene.goal] = False
@@ -80,14 +83,16 @@ def draw_actions(axes: Axes, scene: Scene, probability: FloatArray, **options: U
     norm, x, y = Normalize(0.0, 1.0), *scene.lattice.xy_m[states].T
     arrows = axes.quiver(x, y, *(length * along).T, sure, cmap=_colours(), norm=norm, zorder=2, **style, **head)
     bar = draw_bar(axes, arrows, window, "probability of the most likely move", extend="neither")
+    arrows.set_alpha(_FAINT if over else 1.0)  # after the colour bar, which would fade too
+    options["opaque_people"] = True
     _, nominal, marks, lines = draw_over(axes, scene, window, **options)
     return DrawnActions(axes, window, states, arrows, bar, nominal, marks, lines)
 
 
-def _stride(axes: Axes, scene: Scene, window: Window) -> int:
-    """Distance between cells with an arrow, cells."""
+def _stride(axes: Axes, scene: Scene, window: Window, pitch_in: float) -> int:
+    """Distance between cells with an arrow, cells, for a least distance between arrows on paper, inches."""
     cell_in = scene.lattice.grid.resolution_m / (window[1] - window[0]) * (panel_width_in(axes) - _BESIDE_IN)
-    return max(1, ceil(_PITCH_IN / cell_in))
+    return max(1, ceil(pitch_in / cell_in))
 
 
 def _colours() -> LinearSegmentedColormap:

@@ -17,6 +17,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from navirl_cli.arrays import BoolArray, FloatArray
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, inside, legend_below, window_around
 from navirl_cli.figures.marks import Marks, Places, draw_marks, draw_nominal
 from navirl_cli.figures.overlay import Overlay, draw_overlays, overlay_handles
@@ -59,6 +60,8 @@ class CellOptions(TypedDict, total=False):
     title: str
     #: Whether to put a legend below; default True.
     legend: bool
+    #: Whether people hide the colours below them; by default those of the policy where no visits are.
+    opaque_people: bool
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,11 @@ def draw_policy(axes: Axes, scene: Scene, visits: FloatArray, **options: Unpack[
     colours = colormaps[look().intensity].with_extremes(under=look().paper, bad=(0, 0, 0, 0))
     image = draw_image(axes, scene, visits, norm, colours)
     bar = draw_bar(axes, image, window, VISITS, extend="min")
+    # People are filled where that hides no visits.
+    inside_people = np.zeros(len(visits), dtype=bool)
+    for person in scene.people_m:
+        inside_people |= np.hypot(*(scene.lattice.xy_m - person).T) < PERSON_RADIUS_M
+    options.setdefault("opaque_people", not (visits[inside_people] >= LEAST_VISITS).any())
     return draw_scene(image, bar, scene, window, **options)
 
 
@@ -231,7 +239,8 @@ def draw_over(
     lines = draw_overlays(axes, overlays)
     nominal = draw_nominal(axes, scene.nominal_line_m())
     places = Places(ends[:1], ends[1:], scene.people_m, options.get("robot_radius_m"))
-    marks = draw_marks(axes, window, places, nominal=nominal, title=options.get("title", ""))
+    opaque = options.get("opaque_people", False)
+    marks = draw_marks(axes, window, places, nominal=nominal, title=options.get("title", ""), opaque=opaque)
     if options.get("legend", True):
-        legend_below(axes, [*overlay_handles(overlays), *marks.handles()])
+        legend_below(axes, overlay_handles(overlays), marks.handles())
     return obstacles, nominal, marks, lines

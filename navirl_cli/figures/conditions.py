@@ -18,6 +18,8 @@ from navirl_cli.figures.paths import DrawnPaths, contact_handle, draw_paths, gro
 from navirl_cli.figures.sheet import common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
 
+#: More paths than these have a panel for each group.
+MANY = 40
 #: Mean width of a letter of a title, including a share of the labels beside the map, inches.
 _LETTER_IN = 0.08
 
@@ -31,6 +33,12 @@ class DrawnPanels:
     #: Limits of the view of every panel.
     window_m: Window
     legend: Legend
+
+
+def panels_of(demonstrations: Sequence[Demonstration]) -> list[tuple[str, Sequence[Demonstration]]]:
+    """The panels in which demonstrations are legible: one for each group of more than MANY; none for one map of all."""
+    groups = by_group(demonstrations)
+    return list(groups.items()) if len(demonstrations) > MANY and len(groups) > 1 else []
 
 
 @house_style()
@@ -74,7 +82,8 @@ def _title(axes: Axes, title: str, count: int) -> str:
 
 
 def _handles(drawn: Sequence[DrawnPaths], panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> list[Artist]:
-    """Legend entries of groups, of contact if there was any, and of the maps' marks."""
-    groups = dict.fromkeys(group for _, members in panels for group in by_group(members))
+    """Legend entries of groups that are not the titles, of contact if there was any, and of the maps' marks."""
+    known = [(title, list(by_group(members))) for title, members in panels]
+    groups = [name for title, own in known if own != [title] for name in own]
     contact = [contact_handle()] if any(one.contacts for one in drawn) else []
-    return [*group_handles(groups), *contact, *merged_handles([one.marks for one in drawn])]
+    return [*group_handles(dict.fromkeys(groups)), *contact, *merged_handles([one.marks for one in drawn])]

@@ -10,11 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.font_manager import FontProperties
 from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
 from navirl_cli.arrays import BoolArray, FloatArray
 from navirl_cli.demos.grid import Grid
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.style import look, panel_width_in
 
 #: Limits of the view: x_min, x_max, y_min, y_max, m, map frame.
@@ -22,8 +23,8 @@ Window = tuple[float, float, float, float]
 
 #: Margin around the paths, and around those of a cropped map, m.
 MARGIN_M, CROPPED_M = 1.5, 0.5
-#: Least distance between a person's outline and the border of a cropped map, m.
-_CLEAR_M = 0.1
+#: Least distance between a person's outline and the border of a cropped map, m: a robot has room on either side.
+_CLEAR_M = 0.75
 #: The complete map is shown if its area is less than this times that of the paths' surroundings.
 CROP_FROM = 2.0
 #: Width of a legend's handle with the space around it, and of the border around a legend, inches.
@@ -123,14 +124,31 @@ def draw_obstacles(axes: Axes, grid: Grid) -> AxesImage:
     )
 
 
-def legend_below(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Put a legend below the axes' label, in as many columns as fit into the panel's width."""
+def legend_below(axes: Axes, *sections: Sequence[Artist]) -> None:
+    """Put a legend below the axes' label, in as many columns as fit into the panel's width.
+
+    Args:
+        axes: Those of the map.
+        sections: The entries. Where the columns of all together do not fit, two sections are side by side if they do.
+    """
+    handles = [handle for section in sections for handle in section]
     labels = [str(handle.get_label()) for handle in handles]
     room_in = _LEGEND_SHARE * panel_width_in(axes)
     fitting = (n for n in range(len(labels), 1, -1) if _legend_width_in(labels, n) <= room_in)
     rows = ceil(len(labels) / next(fitting, 1))
     columns = ceil(len(labels) / rows)
+    if columns == 1 and len(sections) == 2:
+        padded = _side_by_side(*sections)
+        if _legend_width_in([str(handle.get_label()) for handle in padded], 2) <= panel_width_in(axes):
+            handles, columns = padded, 2
     axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=_BELOW, ncols=columns)
+
+
+def _side_by_side(left: Sequence[Artist], right: Sequence[Artist]) -> list[Artist]:
+    """Two columns of equal length: the shorter one has empty entries at its end."""
+    rows = max(len(left), len(right))
+    empty = [Line2D([], [], linestyle="none", label=" ") for _ in range(2 * rows)]
+    return [*left, *empty[len(left) : rows], *right, *empty[rows + len(right) :]]
 
 
 def _legend_width_in(labels: Sequence[str], columns: int) -> float:

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.ground import Window, frame, inside
 from navirl_cli.figures.scale import draw_scale_bar
 from navirl_cli.figures.style import look
@@ -45,11 +45,14 @@ class Marks:
     goals: Line2D | None
     beyond: list[Line2D]
     nominal: Line2D | None
-    scale_bar: Line2D
+    #: None where it would hide what is drawn.
+    scale_bar: Line2D | None
     #: People of whom at least a part is visible.
     seen: list[Circle]
-    #: Whether people are filled discs: the people of several trials, not all present at once.
+    #: Whether people are those of several trials, not all present at once.
     filled: bool
+    #: Whether people are filled discs.
+    discs: bool
 
     def handles(self) -> list[Artist]:
         """Legend entries of the marks, including obstacles."""
@@ -65,7 +68,7 @@ class Marks:
             alike = len({str(one.get_linestyle()) for one in self.seen}) == 1
             label = f"person ({len(self.seen)} places)" if alike else "person (line style of path)"
             label = label if self.filled and len(self.seen) > 1 else "person"
-            handles.append(_disc(label, look().person if self.filled else "none", self.seen[0].get_linewidth()))
+            handles.append(_disc(label, look().person if self.discs else "none", self.seen[0].get_linewidth()))
         return [*handles, Patch(facecolor=look().obstacle, edgecolor="none", label="obstacle, inflated")]
 
 
@@ -77,6 +80,7 @@ def draw_marks(
     nominal: Line2D | None = None,
     lines: Sequence[Any] = (),
     title: str = "",
+    opaque: bool = False,
 ) -> Marks:
     """Draw the marks of a map, its frame and a scale bar.
 
@@ -87,22 +91,23 @@ def draw_marks(
         nominal: The nominal path of a map with colours; None on a plain map, where people are filled discs.
         lines: Line styles of the people's outlines, one for each; empty for solid lines.
         title: Title of the panel.
+        opaque: Whether people on colours are filled discs too.
 
     Returns:
         The artists.
     """
-    people = draw_people(axes, places.people_m, filled=nominal is None)
+    people = draw_people(axes, places.people_m, filled=nominal is None or opaque, on_colours=nominal is not None)
     for outline, line in zip(people, lines, strict=False):
         outline.set_linestyle(line)
     robots = draw_starts(axes, places.starts_m, places.robot_radius_m)[1]
     goals, beyond = draw_goals(axes, places.goals_m, window)
     frame(axes, window, title)
-    bar, _ = draw_scale_bar(axes, window)
+    bar = draw_scale_bar(axes, window)
     seen = [one for one in people if inside(window, np.array([one.center]), PERSON_RADIUS_M).all()]
-    return Marks(people, robots, goals, beyond, nominal, bar, seen, nominal is None)
+    return Marks(people, robots, goals, beyond, nominal, bar, seen, nominal is None, nominal is None or opaque)
 
 
-def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circle]:
+def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool, on_colours: bool = False) -> list[Circle]:
     """Draw (p, 2) people, m, map frame, as circles to scale.
 
     Filled discs are below the paths. Their opacity falls with the number of people, because people of several trials
@@ -116,7 +121,7 @@ def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool) -> list[Circl
     for x, y in people_m if filled else ():
         axes.add_patch(Circle((x, y), PERSON_RADIUS_M, **fill))
     line: dict[str, Any] = {"fill": False, "edgecolor": look().ink, "linewidth": _OUTLINE_PT, "zorder": 4}
-    if not filled:
+    if on_colours or not filled:
         halo = (withStroke(linewidth=2.4, foreground=look().paper),)
         line |= {"linewidth": _OUTLINE_ON_COLOURS_PT, "path_effects": halo}
     outlines = [Circle((x, y), PERSON_RADIUS_M, **line) for x, y in people_m]

@@ -11,13 +11,14 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.evaluation.compare import LEARNT, PERSON_RADIUS_M
+from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.groups import by_group
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.figures.style import colour_of, look
 
-#: Width of a path and of the light border around it, points; more paths than these have this opacity.
-_PATH_PT, _HALO_PT = 0.7, 1.3
-_MANY, _OPACITY = 10, 0.6
+#: Width of a path and of the light border around it, points; and of more paths than so many, with their opacity.
+_PATH_PT, _HALO_PT = 0.9, 2.1
+_MANY, _MANY_PT, _MANY_HALO_PT, _OPACITY = 10, 0.7, 1.3, 0.6
 #: Starts farther from each other than this are different tasks, m.
 SAME_START_M = 0.25
 
@@ -52,10 +53,37 @@ def alike(demonstrations: Iterable[Demonstration], one: Demonstration) -> list[D
     return [other for other in demonstrations if _same_task(other, one)]
 
 
+def driven(
+    demonstrations: Sequence[Demonstration], one: Demonstration, *, everywhere: bool = False
+) -> tuple[list[Demonstration], str]:
+    """Demonstrations to draw over the scene of one, and in one line what is left out.
+
+    Args:
+        demonstrations: To choose from.
+        one: Gives scene and participant.
+        everywhere: All on its map, whatever the scene and the participant.
+    """
+    if everywhere:
+        shown = [other for other in demonstrations if _map_of(other) == _map_of(one)]
+        left = len(demonstrations) - len(shown)
+        return shown, f"`overlay` all: {left} paths on other maps are left out" if left else ""
+    shown = [other for other in alike(demonstrations, one) if other.participant == one.participant]
+    left = len(demonstrations) - len(shown)
+    note = (
+        f"`overlay` demos: {len(shown)} of {len(demonstrations)} paths, those of {one.participant} in the scene of "
+        f"{one.id}; `overlay` all draws the others too"
+    )
+    return shown, note if left else ""
+
+
+def _map_of(one: Demonstration) -> tuple[object, ...]:
+    """What maps are compared by."""
+    return one.grid.shape, one.grid.resolution_m, one.grid.origin_m
+
+
 def _same_task(one: Demonstration, other: Demonstration) -> bool:
     """Whether two demonstrations are of the same task."""
-    maps = [(d.grid.shape, d.grid.resolution_m, d.grid.origin_m) for d in (one, other)]
-    if maps[0] != maps[1] or len(one.people_m) != len(other.people_m):
+    if _map_of(one) != _map_of(other) or len(one.people_m) != len(other.people_m):
         return False
     start, end = np.hypot(*(one.xy_m[[0, -1]] - other.xy_m[[0, -1]]).T)
     away = np.hypot(*(one.people_m[:, None] - other.people_m[None]).T)  # (p, p)
@@ -71,10 +99,11 @@ def draw_overlays(axes: Axes, overlays: Iterable[Overlay]) -> list[Line2D]:
     """
     lines = []
     for one in overlays:
-        opacity = 1.0 if len(one.lines_m) <= _MANY else _OPACITY
-        halo = withStroke(linewidth=_HALO_PT, foreground=look().paper, alpha=opacity / 2)
+        few = len(one.lines_m) <= _MANY
+        opacity, width, border = (1.0, _PATH_PT, _HALO_PT) if few else (_OPACITY, _MANY_PT, _MANY_HALO_PT)
+        halo = withStroke(linewidth=border, foreground=look().paper, alpha=0.8 if few else opacity / 2)
         for line_m in one.lines_m:
-            lines += axes.plot(*line_m.T, color=colour_of(one.key), linewidth=_PATH_PT, alpha=opacity, zorder=3.5)
+            lines += axes.plot(*line_m.T, color=colour_of(one.key), linewidth=width, alpha=opacity, zorder=3.5)
             lines[-1].set_path_effects([halo])
     return lines
 

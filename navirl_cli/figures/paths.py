@@ -20,8 +20,9 @@ from navirl_cli.figures.ground import Window, cropped_to, draw_obstacles, legend
 from navirl_cli.figures.marks import Marks, Places, draw_marks
 from navirl_cli.figures.style import colour_of, house_style
 
-#: Widths of a path and of its sections in contact, points.
+#: Widths of a path and of its sections in contact, points; and those of one of many, with its opacity.
 _PATH_PT, _CONTACT_PT = 0.7, 1.7
+_MANY, _MANY_PT, _MANY_CONTACT_PT, _MANY_OPACITY = 20, 0.4, 1.1, 0.8
 #: People nearer to each other than this are at the same place, m.
 _SAME_M = 0.02
 #: Line styles of paths by the places of people; with more places than styles, all are solid.
@@ -81,11 +82,11 @@ def draw_paths(
     grids = _maps(demonstrations)
     obstacles = [draw_obstacles(axes, grid) for grid in grids]
     groups, line_of = by_group(demonstrations), _lines_of([*among, *demonstrations])
-    lines, contacts = [], []
+    lines, contacts, many = [], [], len(demonstrations) > _MANY
     for group, members in groups.items():
         for one in members:
-            contacts.extend(_contacts(axes, one, colour_of(group)))
-            lines.append(_path(axes, one, colour_of(group), line_of[_places(one)]))
+            contacts.extend(_contacts(axes, one, colour_of(group), many=many))
+            lines.append(_path(axes, one, colour_of(group), line_of[_places(one)], many=many))
     window = window_of(demonstrations, crop=crop) if window_m is None else window_m
     people = _distinct(np.concatenate([one.people_m for one in demonstrations]))
     starts = np.array([one.xy_m[0] for one in demonstrations])
@@ -96,7 +97,7 @@ def draw_paths(
     if legend:
         contact = [contact_handle()] if contacts else []
         counts = {group: len(members) for group, members in groups.items()}
-        legend_below(axes, [*group_handles(groups, counts), *contact, *marks.handles()])
+        legend_below(axes, [*group_handles(groups, counts), *contact], marks.handles())
     return DrawnPaths(axes, obstacles, lines, contacts, marks.people, marks.robots, marks)
 
 
@@ -152,15 +153,17 @@ def _line_of_person(person_m: FloatArray, line_of: dict[tuple[tuple[int, int], .
     return lines[0] if len(lines) == 1 else _LINES[0]
 
 
-def _path(axes: Axes, one: Demonstration, colour: str, style: Any) -> Line2D:
-    """Draw one driven path."""
-    (line,) = axes.plot(*one.xy_m.T, color=colour, linewidth=_PATH_PT, linestyle=style, zorder=3)
+def _path(axes: Axes, one: Demonstration, colour: str, style: Any, *, many: bool) -> Line2D:
+    """Draw one driven path, thinner as one of many."""
+    width: dict[str, Any] = {"linewidth": _MANY_PT, "alpha": _MANY_OPACITY} if many else {"linewidth": _PATH_PT}
+    (line,) = axes.plot(*one.xy_m.T, color=colour, linestyle=style, zorder=3, **width)
     return line
 
 
-def _contacts(axes: Axes, one: Demonstration, colour: str) -> list[Line2D]:
+def _contacts(axes: Axes, one: Demonstration, colour: str, *, many: bool) -> list[Line2D]:
     """Draw the sections of a path in contact."""
-    band: dict[str, Any] = {"color": colour, "linewidth": _CONTACT_PT, "solid_capstyle": "butt", "zorder": 3}
+    width = _MANY_CONTACT_PT if many else _CONTACT_PT
+    band: dict[str, Any] = {"color": colour, "linewidth": width, "solid_capstyle": "butt", "zorder": 3}
     return [axes.plot(*_section(one, contact).T, **band)[0] for contact in one.contacts or ()]
 
 

@@ -8,7 +8,7 @@ from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.figures.cells import draw_policy, likely_window
 from navirl_cli.figures.overlay import Overlay
 from navirl_cli.figures.sheet import new_figure, save_figure
-from navirl_cli.figures.style import COLUMN_IN
+from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, house_style
 from navirl_cli.planning.paths import Planner
 
 
@@ -24,16 +24,33 @@ def draw_plan(output: Path, planner: Planner, lines_m: Sequence[FloatArray], *, 
     Raises:
         ArtefactError: The file cannot be written.
     """
-    scene = planner.problem.scene
-    figure, axes = new_figure(COLUMN_IN, None, 1, None)
-    window = likely_window(scene, planner.visits, list(lines_m))
-    overlays = [Overlay("planned", LEARNT, lines_m)]
-    draw_policy(
-        axes[0],
-        scene,
-        planner.visits,
-        robot_radius_m=planner.problem.robot_radius_m,
-        window_m=window,
-        overlays=overlays,
-    )
+    draw_plans(output, [("", planner, lines_m)], force=force)
+
+
+@house_style()
+def draw_plans(output: Path, plans: Sequence[tuple[str, Planner, Sequence[FloatArray]]], *, force: bool) -> None:
+    """The same of several scenes, a panel for each.
+
+    Args:
+        output: The file: .png, .pdf or .svg.
+        plans: Title, policy and planned paths of each scene.
+        force: Whether to replace an existing file.
+
+    Raises:
+        ArtefactError: The file cannot be written.
+    """
+    columns = min(len(plans), 2)
+    figure, axes = new_figure(COLUMN_IN if columns == 1 else PAGE_IN, None, len(plans), columns)
+    for panel, (title, planner, lines_m) in zip(axes, plans, strict=True):
+        scene = planner.problem.scene
+        draw_policy(
+            panel,
+            scene,
+            planner.visits,
+            robot_radius_m=planner.problem.robot_radius_m,
+            window_m=likely_window(scene, planner.visits, list(lines_m)),
+            overlays=[Overlay("planned", LEARNT, lines_m)],
+        )
+        if title:
+            panel.set_title(title)
     save_figure(figure, output, force=force)

@@ -57,7 +57,7 @@ def draw_policy_and_reward(
     if not scenes:
         raise SceneError("no scene to draw")
     policies, rewards = [], []
-    look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False}
+    look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False, "opaque_people": False}
     for (title, one), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
         policies.append(draw_policy(left, one.scene, one.visits, window_m=window_m, **look))
         rewards.append(draw_reward(right, one.scene, one.reward_by_cell, window_m=policies[-1].window_m, **look))

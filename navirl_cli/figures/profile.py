@@ -1,14 +1,14 @@
 """Profile likelihoods: the largest log-likelihood with one parameter fixed, on both sides of its estimate."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from navirl_cli.errors import ArtefactError
+from navirl_cli.errors import ArtefactError, unknown
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look, panel_width_in
 from navirl_cli.irl.profile import Profile, fall_at
@@ -32,6 +32,19 @@ def symbol_of(name: str) -> str:
     return f"${head}_{below}$" if index else f"${head}$"
 
 
+def chosen_profiles(profiles: Sequence[Profile], names: Collection[str]) -> list[Profile]:
+    """The profiles of some parameters, or all where none is named.
+
+    Raises:
+        ArtefactError: A parameter has no profile.
+    """
+    known = {one.name: one for one in profiles}
+    for name in names:
+        if name not in known:
+            raise ArtefactError(f"{unknown('`parameter`', name, known)}; fit again with `profile` for others")
+    return [known[name] for name in dict.fromkeys(names)] or list(profiles)
+
+
 def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_in: float) -> Figure:
     """Draw profile likelihoods side by side.
 
@@ -48,10 +61,10 @@ def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_i
     """
     count = len(profiles)
     if width_in / count < NARROWEST_IN:
-        wider = "set `wide`, or fit" if PAGE_IN / count >= NARROWEST_IN else "fit"
+        wider = "set `wide`, or name" if PAGE_IN / count >= NARROWEST_IN else "name"
         raise ArtefactError(
             f"{count} profiles side by side are not legible in {width_in:g} in: expected "
-            f"{int(width_in / NARROWEST_IN)} at most; {wider} again with fewer parameters in `profile`"
+            f"{int(width_in / NARROWEST_IN)} at most; {wider} fewer with `parameter`"
         )
     height_in = min(width_in / count * ASPECT + (MORE_IN if count > 1 else 0.0), TALLEST_IN)
     figure, axes = new_figure(width_in, height_in, count)

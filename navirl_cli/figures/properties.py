@@ -1,14 +1,15 @@
-"""Properties of paths by group, as bars (Fig. 7)."""
+"""Properties of paths by group, as points with their intervals, or as bars (Fig. 7)."""
 
 import re
 from collections.abc import Container, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.container import BarContainer
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
@@ -21,8 +22,13 @@ from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
-#: Note below the panels.
-NOTE = "bars: mean, whiskers: standard deviation"
+#: Notes below the panels.
+NOTE = "points: mean, thick lines: its 95 % interval, thin lines: standard deviation"
+BARS_NOTE = "bars: mean, whiskers: standard deviation"
+#: An axis of points includes 0 where the lowest end is below this share of the highest.
+_NEAR_ZERO = 0.4
+#: Diameter of a point, and width of its interval and of the standard deviation, points.
+_POINT_PT, _THICK_PT, _THIN_PT = 5.0, 3.2, 0.8
 #: Largest share of a figure's width for the bars' labels; mean width of a letter, inches.
 _LABELLED, _LETTER_IN = 0.25, 0.055
 #: Height of a line of text, and distance between two bars, inches.
@@ -31,6 +37,8 @@ _LINE_IN, _BETWEEN_IN = 0.125, 0.06
 _BELOW_IN, _NARROW_IN, _SHORT = 0.58, 1.8, 13
 #: Largest number of intervals between ticks; share of a panel's width for them; least distance between numbers, inches.
 _INTERVALS, _TICKED, _APART_IN = 4, 0.68, 0.04
+#: Half a 95 % interval of a normal distribution, standard errors.
+_NORMAL = 1.959964
 _WHISKER: dict[str, Any] = {"elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8}
 
 
@@ -46,6 +54,8 @@ class PropertyBar:
     std: Values
     #: Number of paths.
     count: int
+    #: Half the 95 % interval of the mean; nothing where there is none.
+    half: Values = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,11 @@ class DrawnProperties:
     """The artists of :func:`draw_properties`, by panel."""
 
     axes: list[Axes]
+    #: Either bars, or points with the intervals of their means and standard deviations.
     bars: list[BarContainer]
+    points: list[PathCollection]
+    intervals: list[LineCollection]
+    spreads: list[LineCollection]
 
 
 def bars_of(rows: Iterable[GroupMetrics], learnt_from: Container[str] | None = None) -> list[PropertyBar]:
@@ -72,11 +86,16 @@ def bars_of(rows: Iterable[GroupMetrics], learnt_from: Container[str] | None = N
     bars = []
     for row in rows:
         if row.path_type == DRIVEN:
-            bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count))
+            bars.append(PropertyBar(row.group, row.group, row.mean, row.std, row.count, _half(row)))
         elif row.path_type in {ON_GRID, LEARNT} and (learnt_from is None or row.group in learnt_from):
             name, key = ("learnt", LEARNT) if row.path_type == LEARNT else ("on grid", row.group)
-            bars.append(PropertyBar(f"{row.group}, {name}", key, row.mean, row.std, row.count))
+            bars.append(PropertyBar(f"{row.group}, {name}", key, row.mean, row.std, row.count, _half(row)))
     return bars
+
+
+def _half(row: GroupMetrics) -> Values:
+    """Half the 95 % interval of each mean: of drawn paths by the Monte Carlo error, of others by participants."""
+    return row.half_interval or {name: _NORMAL * error for name, error in row.error.items()}
 
 
 def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
@@ -92,30 +111,40 @@ def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
 
 
 @house_style()
-def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar]) -> DrawnProperties:
-    """Draw mean and standard deviation of every metric as horizontal bars, one panel for each.
+def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar], *, as_bars: bool = False) -> DrawnProperties:
+    """Draw mean, interval and standard deviation of every metric, one panel for each.
 
-    Bars start at 0. A note below explains bars and whiskers. A mean that does not exist, such as the distance to people
-    in scenes without people, is marked "n/a".
+    Points have axes that need not begin at 0, so that small differences of long paths are visible. Bars start at 0,
+    with the standard deviation alone. A note below explains them. A mean that does not exist, such as the distance to
+    people in scenes without people, is marked "n/a".
 
     Args:
         axes: One for each of PAPER_METRICS, side by side, :func:`height_for` inches high with labels. The first has the
-            labels of the bars.
+            labels of the rows.
         bars: From top to bottom.
+        as_bars: Draw bars in place of points.
 
     Returns:
         The artists.
 
     Raises:
-        DemonstrationError: No bars.
+        DemonstrationError: Nothing to draw.
     """
     if not bars:
         raise DemonstrationError("no path properties to draw")
-    drawn = [_draw_panel(panel, metric, bars) for panel, metric in zip(axes, PAPER_METRICS, strict=True)]
+    drawn = DrawnProperties(list(axes), [], [], [], [])
+    for panel, metric in zip(axes, PAPER_METRICS, strict=True):
+        if as_bars:
+            drawn.bars.append(_draw_bars(panel, metric, bars))
+        else:
+            point, interval, spread = _draw_points(panel, metric, bars)
+            drawn.points.append(point)
+            drawn.intervals.append(interval)
+            drawn.spreads.append(spread)
     width_in = panel_width_in(axes[0]) * len(axes)
     axes[0].set_yticks(range(len(bars)), [_label(bar, width_in) for bar in bars])
-    axes[0].figure.supxlabel(NOTE, fontsize="small")
-    return DrawnProperties(list(axes), drawn)
+    axes[0].figure.supxlabel(fill(BARS_NOTE if as_bars else NOTE, int(width_in / _LETTER_IN)), fontsize="small")
+    return drawn
 
 
 def _label(bar: PropertyBar, width_in: float) -> str:
@@ -128,38 +157,61 @@ def _label(bar: PropertyBar, width_in: float) -> str:
     return fill(label, letters, break_long_words=False, break_on_hyphens=False)
 
 
-def _draw_panel(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarContainer:
-    """Draw one metric."""
-    at = np.arange(len(bars))
-    mean = np.array([bar.mean[metric.name] for bar in bars], dtype=float)
-    std = np.array([bar.std[metric.name] for bar in bars], dtype=float)
-    colours = [colour_of(bar.key) for bar in bars]
-    ink = look().ink
+def _draw_bars(axes: Axes, metric: Metric, bars: Sequence[PropertyBar]) -> BarContainer:
+    """Draw one metric as bars."""
+    at, mean, std, ink = np.arange(len(bars)), _values(bars, metric, "mean"), _values(bars, metric, "std"), look().ink
     whisker = {**_WHISKER, "ecolor": ink}
+    colours = [colour_of(bar.key) for bar in bars]
     drawn = axes.barh(at, mean, 0.7, xerr=std, color=colours, edgecolor=ink, linewidth=0.5, error_kw=whisker)
-    for y in at[np.isnan(mean)]:
-        axes.annotate("n/a", (0.0, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
-    narrow = panel_width_in(axes) < _NARROW_IN
-    label = f"{metric.label} [{metric.unit}]"
-    axes.set_xlabel(fill(label, _SHORT) if narrow else label)
-    axes.set_ylim(len(bars) - 0.4, -0.6)
-    low, high = _limits(mean, std)
-    axes.set_xlim(low, high)
-    axes.set_xticks(*_ticks(low, high, _TICKED * panel_width_in(axes)))
+    _finish(axes, metric, mean, *_limits(mean, std))
     axes.axvline(0.0, color=ink, linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-    axes.set_yticks(at, [""] * len(bars))
     return drawn
 
 
-def _limits(mean: FloatArray, std: FloatArray) -> tuple[float, float]:
-    """Limits of the metric's axis: from 0, or below the lowest whisker, to above the highest whisker."""
-    spread = np.nan_to_num(std)
-    ends = np.concatenate([[0.0], (mean - spread)[~np.isnan(mean)], (mean + spread)[~np.isnan(mean)]])
+def _draw_points(
+    axes: Axes, metric: Metric, bars: Sequence[PropertyBar]
+) -> tuple[PathCollection, LineCollection, LineCollection]:
+    """Draw one metric as points: the points, the intervals of their means, and the standard deviations."""
+    at, mean, std = np.arange(len(bars)), _values(bars, metric, "mean"), _values(bars, metric, "std")
+    half, colours = _values(bars, metric, "half"), [colour_of(bar.key) for bar in bars]
+    spread = axes.hlines(at, mean - std, mean + std, color=look().ink, linewidth=_THIN_PT, zorder=3)
+    interval = axes.hlines(at, mean - half, mean + half, color=colours, linewidth=_THICK_PT, zorder=2)
+    edge: dict[str, Any] = {"edgecolor": look().ink, "linewidths": 0.5}
+    point = axes.scatter(mean, at, s=_POINT_PT**2, c=colours, zorder=4, **edge)
+    ends = np.fmax(np.nan_to_num(std), np.nan_to_num(half))
+    _finish(axes, metric, mean, *_limits(mean, ends, from_zero=False))
+    axes.grid(axis="x", color=look().obstacle, linewidth=0.4)
+    return point, interval, spread
+
+
+def _values(bars: Sequence[PropertyBar], metric: Metric, kind: str) -> FloatArray:
+    """(n,) of every row; NaN where there is none."""
+    return np.array([getattr(bar, kind).get(metric.name, np.nan) for bar in bars], dtype=float)
+
+
+def _finish(axes: Axes, metric: Metric, mean: FloatArray, low: float, high: float) -> None:
+    """Mark what does not exist, and write labels and ticks."""
+    for y in np.flatnonzero(np.isnan(mean)):
+        axes.annotate("n/a", (low, y), (3.0, 0.0), textcoords="offset points", va="center", fontsize="small")
+    label = f"{metric.label} [{metric.unit}]"
+    axes.set_xlabel(fill(label, _SHORT) if panel_width_in(axes) < _NARROW_IN else label)
+    axes.set_ylim(len(mean) - 0.4, -0.6)
+    axes.set_xlim(low, high)
+    axes.set_xticks(*_ticks(low, high, _TICKED * panel_width_in(axes)))
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    axes.set_yticks(range(len(mean)), [""] * len(mean))
+
+
+def _limits(mean: FloatArray, spread: FloatArray, *, from_zero: bool = True) -> tuple[float, float]:
+    """Limits of the metric's axis: around the ends, and from 0 where that is wanted or near."""
+    known, wide = mean[~np.isnan(mean)], np.nan_to_num(spread)[~np.isnan(mean)]
+    ends = np.concatenate([known - wide, known + wide]) if len(known) else np.zeros(1)
     low, high = float(ends.min()), float(ends.max())
-    room = 0.06 * (high - low) or 1.0
-    return (low - room if low < 0 else 0.0), high + room
+    if from_zero or low < _NEAR_ZERO * high:
+        low, high = min(low, 0.0), max(high, 0.0)
+    room = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
+    return (0.0 if low == 0 else low - room), high + room
 
 
 def _ticks(low: float, high: float, width_in: float) -> tuple[FloatArray, list[str]]:

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.evaluation.ranks import GroupRanks, uniformity
+from navirl_cli.evaluation.ranks import GroupRanks
 from navirl_cli.figures.ground import legend_below
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look
 
@@ -103,6 +103,6 @@ def draw_rank_panels(axes: Sequence[Axes], groups: Sequence[GroupRanks]) -> list
         The artists of each panel.
     """
     return [
-        draw_ranks(one, np.array([rank.rank for rank in own.ranks]), uniformity(own.ranks)[1], group=own.name)
+        draw_ranks(one, np.array([rank.rank for rank in own.ranks]), own.uniformity()[1], group=own.name)
         for one, own in zip(axes, groups, strict=True)
     ]

@@ -1,10 +1,12 @@
-"""A scale bar in the corner of a map where it hides least."""
+"""A scale bar at a place of a map where it hides nothing."""
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
@@ -19,31 +21,37 @@ from navirl_cli.figures.style import look, panel_width_in
 _LEAST, _MOST = 0.08, 0.4
 #: Distance from the borders, and height and least width of bar and number, inches.
 _PAD_IN, _HIGH_IN, _WIDE_IN = 0.07, 0.2, 0.25
+#: Number of places tried at each border.
+_PLACES = 9
 #: Lines are sampled at this distance, m.
 _SPACING_M = 0.1
 
 
-def draw_scale_bar(axes: Axes, window: Window) -> tuple[Line2D, Annotation]:
-    """Draw a scale bar of 1 m, or of a length that fits, into the emptiest corner of a map.
+def draw_scale_bar(axes: Axes, window: Window) -> Line2D | None:
+    """Draw a scale bar of 1 m, or of a length that fits, at a free place at the upper or lower border of a map.
 
     Args:
         axes: Those of the map, with everything else already drawn.
         window: Limits of the view, m.
 
     Returns:
-        The bar and its number.
+        The bar; None, and nothing drawn, where every place would hide paths, marks, arrows or visited cells. The axes
+        are in metres too.
     """
     length = length_m(window[1] - window[0])
-    middle, top = free_corner(axes, window, length)
+    middle, top, hides = free_place(axes, window, length)
+    if hides:
+        return None
     ends: dict[str, Any] = {"solid_capstyle": "butt", "zorder": 7, "label": "_scale"}
     x = middle[0] + length * np.array([-0.5, 0.5])
     (bar,) = axes.plot(x, middle[[1, 1]], color=look().ink, linewidth=1.6, **ends)
     bar.set_path_effects([withStroke(linewidth=3.2, foreground=look().paper)])
-    return bar, write_beside(axes, f"{length:g} m", middle, top=top)
+    write_beside(axes, f"{length:g} m", middle, top=top)
+    return bar
 
 
-def free_corner(axes: Axes, window: Window, length: float) -> tuple[FloatArray, bool]:
-    """The corner of a map in which a mark with a number hides least.
+def free_place(axes: Axes, window: Window, length: float) -> tuple[FloatArray, bool, bool]:
+    """The place at the upper or lower border of a map in which a mark with a number hides least.
 
     Args:
         axes: Those of the map.
@@ -51,20 +59,22 @@ def free_corner(axes: Axes, window: Window, length: float) -> tuple[FloatArray, 
         length: Length of the mark along x, m.
 
     Returns:
-        (2,) place of the mark's middle, m, and whether its number is below it, as in the upper corners.
+        (2,) place of the mark's middle, m; whether its number is below it, as at the upper border; and whether it hides
+        something. Of equal places corners come first, on the right and below. Colours of a map that is coloured
+        everywhere are hidden where nothing else is.
     """
     x0, x1, y0, y1 = window
     inch_m = (x1 - x0) / panel_width_in(axes)  # a little too small: labels are beside the map
     pad, high, wide = _PAD_IN * inch_m, _HIGH_IN * inch_m, max(length, _WIDE_IN * inch_m)
-    busy = _drawn_m(axes)
-    hidden = {}
-    for right, top in product((True, False), (False, True)):
-        left, low = (x1 - pad - wide if right else x0 + pad), (y1 - pad - high if top else y0 + pad)
+    busy, coloured = np.concatenate([_drawn_m(axes), _visited_m(axes)]), _coloured_m(axes)
+    lefts = np.linspace(x1 - pad - wide, x0 + pad, _PLACES)[[0, -1, *range(1, _PLACES - 1)]]
+    places = {}
+    for left, top in product(lefts, (False, True)):
+        low = y1 - pad - high if top else y0 + pad
         box = (left - pad, left + wide + pad, low - pad, low + high + pad)
-        hidden[right, top] = int(inside(box, busy).sum())
-    right, top = min(hidden, key=lambda corner: hidden[corner])  # the first of equal ones
-    x = x1 - pad - wide / 2 if right else x0 + pad + wide / 2
-    return np.array([x, y1 - pad if top else y0 + pad]), top
+        places[float(left), top] = int(inside(box, busy).sum()), int(inside(box, coloured).sum())
+    left, top = min(places, key=lambda place: places[place])  # the first of equal ones
+    return np.array([left + wide / 2, y1 - pad if top else y0 + pad]), top, places[left, top][0] > 0
 
 
 def write_beside(axes: Axes, text: str, middle: FloatArray, *, top: bool) -> Annotation:
@@ -102,4 +112,29 @@ def _drawn_m(axes: Axes) -> FloatArray:
         if isinstance(field, Quiver):
             tails = np.asarray(field.get_offsets(), dtype=float)
             points += [tails, tails + np.stack([field.U, field.V], axis=1)]
+    return np.concatenate(points)
+
+
+def _visited_m(axes: Axes) -> FloatArray:
+    """(n, 2) centres of cells that stand out from their surroundings: those of a logarithmic scale within it."""
+    return _cells_m(axes, lambda norm, values: isinstance(norm, LogNorm) & (values >= (norm.vmin or 0.0)))
+
+
+def _coloured_m(axes: Axes) -> FloatArray:
+    """(n, 2) centres of cells that have any value of a scale."""
+    return _cells_m(axes, lambda norm, values: (not isinstance(norm, LogNorm)) & np.isfinite(values))
+
+
+def _cells_m(axes: Axes, chosen: Callable[[Any, FloatArray], Any]) -> FloatArray:
+    """(n, 2) centres of some cells of the images below everything else, m."""
+    points = [np.empty((0, 2))]
+    for image in axes.images:
+        table = image.get_array()
+        if image.get_zorder() != 0 or table is None:
+            continue
+        values: FloatArray = np.ma.filled(np.ma.asarray(table, dtype=float), np.nan)
+        x0, x1, y0, y1 = image.get_extent()
+        rows, columns = np.nonzero(np.broadcast_to(chosen(image.norm, values), values.shape))
+        x = x0 + (columns + 0.5) * (x1 - x0) / values.shape[1]
+        points.append(np.stack([x, y0 + (rows + 0.5) * (y1 - y0) / values.shape[0]], axis=1))
     return np.concatenate(points)

@@ -21,7 +21,7 @@ from matplotlib.ticker import AutoLocator, FixedLocator
 from navirl_cli.arrays import FloatArray
 from navirl_cli.documents.inline import printable
 from navirl_cli.errors import ArtefactError
-from navirl_cli.figures.style import COLUMN_IN, house_style, look
+from navirl_cli.figures.style import COLUMN_IN, SPACING, house_style, line_spacing, look
 from navirl_cli.files import check_writable, replacing
 
 #: Metadata of a file by format, without dates. matplotlib loads the writer of a format when it is needed; none needs a
@@ -130,6 +130,9 @@ def trim_height(figure: Figure) -> None:
 
 def _lay_out(figure: Figure, *, trim: bool) -> None:
     """Lay out until no panel moves any more, nothing is clipped and, with ``trim``, no height is empty."""
+    if line_spacing() != SPACING:
+        for text in figure.findobj(Text):
+            text.set_linespacing(line_spacing())
     layout, at = figure.get_layout_engine(), _places_in(figure)
     for number in range(_MOST_LAYOUTS):
         if number == _FREE_LAYOUTS:

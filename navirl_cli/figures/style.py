@@ -1,12 +1,14 @@
 """Style of all figures: sizes of a page, fonts, looks for paper and screen, and colours."""
 
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
+from zlib import crc32
 
 import matplotlib as mpl
 import numpy as np
@@ -23,6 +25,8 @@ DPI = 300
 
 #: Ink on paper. Figures that other looks have too take the ink of :func:`look`.
 INK = "#000000"
+#: Parts of a group's name behind its condition that name no special set.
+_NO_SET = r"cycle \d+|no cycle|main task|no people"
 #: Colour of any other key.
 OTHER_COLOUR = "#8C8C8C"
 
@@ -44,6 +48,9 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "driven": "#404040",
         "driven, on grid": "#7A7A7A",
         "nominal": "#BFBFBF",
+        "set 1": "#544C00",
+        "set 2": "#A0522D",
+        "set 3": "#AA3377",
     }
 )
 
@@ -64,6 +71,9 @@ DARK_COLOURS: Mapping[str, str] = MappingProxyType(
         "driven": "#D6D6D6",
         "driven, on grid": "#A6A6A6",
         "nominal": "#7D7D7D",
+        "set 1": "#DCD678",
+        "set 2": "#CD8260",
+        "set 3": "#E06EAF",
     }
 )
 
@@ -95,14 +105,21 @@ LOOKS: Mapping[str, Look] = MappingProxyType(
 )
 _LOOK: ContextVar[Look] = ContextVar("look", default=LOOKS["paper"])
 
+#: matplotlib's distance of lines of a text, in heights of a line.
+SPACING = 1.2
+#: Fonts by name, each with the family of mathematical text that goes with it and the distance of its lines. matplotlib
+#: brings them all, so that a figure looks alike everywhere.
+FONTS: Mapping[str, tuple[str, str, float]] = MappingProxyType(
+    {"sans": ("DejaVu Sans", "dejavusans", SPACING), "times": ("STIXGeneral", "stix", 0.86)}
+)
+_FONT: ContextVar[str] = ContextVar("font", default="sans")
+
 #: Colour map of a scale from disagreement over neutral to agreement, and its ends. The end of agreement is darker: the
 #: two sides stay distinct in grey print.
 _LEVELS_MAP, _LEVELS_FROM, _LEVELS_TO = "PuOr", 0.14, 0.95
 
 _STYLE: Mapping[Any, Any] = MappingProxyType(
     {
-        "font.family": "sans-serif",
-        "font.sans-serif": ["DejaVu Sans"],
         "font.size": 8,
         "axes.titlesize": 8,
         "axes.labelsize": 8,
@@ -146,17 +163,21 @@ def look() -> Look:
 
 
 @contextmanager
-def styled(name: str) -> Iterator[None]:
-    """Open, draw and save figures in one of LOOKS within the context. The default is paper.
+def styled(name: str, font: str = "sans", dpi: int | None = None) -> Iterator[None]:
+    """Open, draw and save figures in one of LOOKS within the context. The default is paper, without serifs.
 
     Args:
         name: A key of LOOKS.
+        font: A key of FONTS.
+        dpi: Resolution in place of that of the look, dots per inch.
     """
-    token = _LOOK.set(LOOKS[name])
+    chosen = LOOKS[name] if dpi is None else replace(LOOKS[name], dpi=dpi)
+    tokens = _LOOK.set(chosen), _FONT.set(font)
     try:
         yield
     finally:
-        _LOOK.reset(token)
+        _LOOK.reset(tokens[0])
+        _FONT.reset(tokens[1])
 
 
 @contextmanager
@@ -170,9 +191,16 @@ def house_style() -> Iterator[None]:
         warnings.filterwarnings("ignore", r"Glyph \d+ ")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
+        family, mathematics, _ = FONTS[_FONT.get()]
+        mpl.rcParams.update({"font.family": [family], "mathtext.fontset": mathematics})
         for part, colour in (("ink", look().ink), ("paper", look().paper)):
             mpl.rcParams.update(dict.fromkeys(_COLOURED[part], colour))
         yield
+
+
+def line_spacing() -> float:
+    """Distance of lines of a text in the current font, for :meth:`matplotlib.text.Text.set_linespacing`."""
+    return FONTS[_FONT.get()][2]
 
 
 def colour_of(key: str) -> str:
@@ -180,16 +208,25 @@ def colour_of(key: str) -> str:
 
     Args:
         key: A group as :func:`navirl_cli.evaluation.groups.group_of` names it, or a type of path. The third and later
-            cycles of force share a colour. Cycles of other conditions, and special sets, have their condition's.
-            Unknown keys are grey.
+            cycles of force share a colour. Cycles of other conditions have their condition's. Special sets have colours
+            of their own, whatever their condition and cycle. Unknown keys are grey.
 
     Returns:
         The colour as #RRGGBB, the same hue in every look.
     """
     colours, (condition, *rest) = look().colours, key.split(", ")
+    if key in colours:
+        return colours[key]
+    if rest and condition in colours and not re.fullmatch(_NO_SET, rest[-1]):
+        return colours[_set_key(rest[-1])]
     if condition == Condition.FORCE and rest and rest[0].startswith("cycle "):
         return colours.get(f"{condition}, {rest[0]}", colours["force, later cycles"])
-    return colours.get(key, colours.get(condition, OTHER_COLOUR))
+    return colours.get(condition, OTHER_COLOUR)
+
+
+def _set_key(name: str) -> str:
+    """The key of a special set's colour: that of the study's obstacle course, or one that depends on the name alone."""
+    return "set 1" if name == "obstacle course" else f"set {1 + crc32(name.encode()) % 3}"
 
 
 def level_colours(levels: int) -> list[str]:

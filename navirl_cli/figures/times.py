@@ -1,6 +1,6 @@
 """Completion times of the obstacle course by modality (Fig. 2)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.text import Annotation
+from matplotlib.ticker import MaxNLocator, NullLocator
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
@@ -17,10 +18,18 @@ from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
 
 #: Note below the boxes.
 NOTE = "box: median and quartiles, whiskers: within 1.5 IQR, dots: all times"
+#: The scale is logarithmic where the longest time is more than so many times the median of all.
+_LONG = 2.5
+#: Ticks of a logarithmic scale in every power of ten: the first of these of which there are not more than so many.
+_TICKS, _MOST_TICKS = ((1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0), (1.0, 2.0, 5.0), (1.0,)), 8
+#: Middles of box and dots beside the middle of a modality, as shares of its width.
+_LEFT, _RIGHT = -0.17, 0.2
+#: Least width of a modality with the number of its median, inches.
+_NUMBERED_IN = 0.8
 #: Height of the figure, inches.
 HEIGHT_IN = 2.3
 #: Largest width of a box, inches and as a share of a modality's width; largest share of this width for dots.
-_BOX_IN, _BOXED, _DOTTED = 0.7, 0.6, 0.9
+_BOX_IN, _BOXED, _DOTTED = 0.4, 0.3, 0.45
 #: Diameter of a dot, points; distance of dots side by side, inches, and one above the other, as a share of the axis.
 _DOT_PT, _BESIDE_IN, _ABOVE = 3.2, 0.055, 0.035
 #: Opacity of a box, low enough for the median to stand out.
@@ -35,6 +44,8 @@ class DrawnTimes:
     """The artists of :func:`draw_completion_times`, by modality."""
 
     axes: Axes
+    #: Values of the medians, beside the boxes where there is room.
+    numbers: list[Annotation]
     boxes: list[PathPatch]
     medians: list[Line2D]
     #: Two for each modality, the lower one first.
@@ -45,9 +56,11 @@ class DrawnTimes:
 
 @house_style()
 def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) -> DrawnTimes:
-    """Draw completion times as box plots, with every time as a dot. Dots that would overlap are moved sideways.
+    """Draw completion times as box plots, with every time as a dot beside its box.
 
-    A box spans the quartiles. Whiskers reach to the farthest times within 1.5 times its height (Tukey).
+    A box spans the quartiles; its median is named. Whiskers reach to the farthest times within 1.5 times its height
+    (Tukey). Dots that would overlap are moved sideways. The scale is logarithmic where a few long times would leave
+    little of a linear one for all others.
 
     Args:
         axes: Where to draw, at least HEIGHT_IN high with its labels.
@@ -71,7 +84,7 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
     box, line = {"edgecolor": INK, "linewidth": 0.8}, {**_LINE, "solid_capstyle": "butt"}
     drawn = axes.boxplot(
         list(times.values()),
-        positions=range(len(times)),
+        positions=[at + _LEFT for at in range(len(times))],
         widths=min(_BOXED, _BOX_IN / room_in),
         patch_artist=True,
         showfliers=False,
@@ -83,19 +96,52 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
     )
     for patch, modality in zip(drawn["boxes"], times, strict=True):
         patch.set_facecolor((colour_of(modality), _OPACITY))
-    highest = max(float(values[-1]) for values in times.values())
-    dots = [_dots(axes, at, values, highest, room_in) for at, values in enumerate(times.values())]
+    everything = np.concatenate(list(times.values()))
+    highest, lowest = float(everything.max()), float(everything.min())
+    logarithmic = highest > _LONG * float(np.median(everything))
+    span = np.log(highest / lowest) if logarithmic else highest
+    dots = [
+        _dots(axes, at, values, span, room_in, np.log if logarithmic else np.asarray)
+        for at, values in enumerate(times.values())
+    ]
+    named = times.values() if room_in >= _NUMBERED_IN else ()
+    numbers = [_number(axes, at, float(np.median(values))) for at, values in enumerate(named)]
     _label(axes, times, room_in)
-    axes.set_ylim(0.0, 1.06 * highest)
-    return DrawnTimes(axes, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
+    if logarithmic:
+        _logarithmic(axes, lowest, highest)
+    else:
+        axes.set_ylim(0.0, 1.06 * highest)
+    return DrawnTimes(axes, numbers, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
 
 
-def _dots(axes: Axes, at: int, times: FloatArray, highest: float, room_in: float) -> Line2D:
-    """Draw all sorted times of one modality, in its middle where no other dot is."""
-    ranks = _ranks(times, _ABOVE * highest)
+def _number(axes: Axes, at: int, median: float) -> Annotation:
+    """Write a median left of its box."""
+    place: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "center", "fontsize": "small"}
+    return axes.annotate(f"{median:.3g}", (at + _LEFT - _BOXED / 2, median), (-2.0, 0.0), **place)
+
+
+def _logarithmic(axes: Axes, lowest: float, highest: float) -> None:
+    """A logarithmic axis with round numbers."""
+    axes.set_yscale("log")
+    axes.set_ylim(lowest / 1.15, 1.1 * highest)
+    powers = 10.0 ** np.arange(np.floor(np.log10(lowest)) - 1, np.ceil(np.log10(highest)) + 1)
+    for steps in _TICKS:
+        every = [float(power * step) for power in powers for step in steps]
+        at = [value for value in every if lowest / 1.15 <= value <= 1.1 * highest]
+        if len(at) <= _MOST_TICKS:
+            break
+    axes.set_yticks(at, [f"{value:g}" for value in at])
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _dots(
+    axes: Axes, at: int, times: FloatArray, span: float, room_in: float, scale: Callable[[FloatArray], FloatArray]
+) -> Line2D:
+    """Draw all sorted times of one modality right of its box, in a line where no other dot is near on the axis."""
+    ranks = _ranks(scale(times), _ABOVE * span)
     beside = min(_BESIDE_IN / room_in, _DOTTED / max(1, int(np.ptp(ranks))))
     look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 4}
-    (drawn,) = axes.plot(at + beside * ranks, times, linestyle="none", marker="o", markersize=_DOT_PT, **look)
+    (drawn,) = axes.plot(at + _RIGHT + beside * ranks, times, linestyle="none", marker="o", markersize=_DOT_PT, **look)
     return drawn
 
 
@@ -116,7 +162,7 @@ def _label(axes: Axes, times: Mapping[str, FloatArray], room_in: float) -> None:
     axes.set_xticks(range(len(times)), names)
     axes.set_xlim(-0.5, len(times) - 0.5)
     axes.tick_params(axis="x", length=0)
-    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))  # of a linear axis
     axes.set_ylabel("completion time [s]")
     axes.set_xlabel(fill(NOTE, int(room_in * len(times) / _LETTER_IN)), fontsize="small")
     axes.spines[["top", "right"]].set_visible(False)

@@ -8,6 +8,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.contour import QuadContourSet
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from navirl_cli.arrays import FloatArray
@@ -22,21 +24,23 @@ from navirl_cli.figures.cells import (
     shown_states,
     table_of,
 )
+from navirl_cli.figures.ground import frame
 from navirl_cli.figures.style import INK, house_style
 from navirl_cli.irl.scene import Scene
 
 #: Lightest at the goal; light enough everywhere for dark contour lines.
 VALUE_MAP = LinearSegmentedColormap.from_list("value", colormaps["YlGnBu_r"](np.linspace(0.35, 1.0, 256)))
-#: Largest number of contour lines.
-_CONTOURS = 12
+#: Largest number of contour lines, and size of their numbers, points.
+_CONTOURS, _NUMBER_PT = 10, 5.5
 
 
 @dataclass(frozen=True)
 class DrawnValue(DrawnCells):
     """The artists of :func:`draw_value`."""
 
-    #: Lines of equal value, at round numbers that the colour bar has too.
+    #: Lines of equal value, at round numbers that the colour bar has too; and their numbers.
     contours: QuadContourSet
+    numbers: list[Text]
 
 
 @house_style()
@@ -71,5 +75,15 @@ def draw_value(axes: Axes, scene: Scene, value: FloatArray, **options: Unpack[Ce
     contours = axes.contour(x, y, table_of(scene, value), inner, colors=INK, linewidths=0.5, linestyles="-", zorder=0.5)
     bar = draw_bar(axes, image, window, "soft value [nats]", extend="neither")
     bar.add_lines(contours)
+    # Before the view is set: numbers of lines that leave it are at places inside.
+    frame(axes, window)
+    numbers = list(axes.clabel(contours, fmt=_number, fontsize=_NUMBER_PT, colors=INK, inline_spacing=2, zorder=3.6))
+    for number in numbers:
+        number.set_path_effects([withStroke(linewidth=1.2, foreground=VALUE_MAP(0.9))])
+    options["opaque_people"] = True
     drawn = draw_scene(image, bar, scene, window, **options)
-    return DrawnValue(**vars(drawn), contours=contours)
+    return DrawnValue(**vars(drawn), contours=contours, numbers=numbers)
+
+
+def _number(value: float) -> str:
+    return f"{value:g}".replace("-", "\N{MINUS SIGN}")

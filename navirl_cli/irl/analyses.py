@@ -13,6 +13,7 @@ from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.intervals import Intervals, Kind, default_kind, intervals
+from navirl_cli.irl.newcomer import Others, newcomer
 from navirl_cli.irl.population import Population, population
 from navirl_cli.irl.profile import Profile, number_of, profile
 from navirl_cli.irl.reward import Reward
@@ -53,6 +54,8 @@ class Questions:
     intervals: Kind | None = None
     #: Whether all people have one reward.
     pool: Pool = Pool.ALL
+    #: Whose reward is learnt from a prior of people who differ.
+    person: str | None = None
 
     def check_arguments(self, steps: Steps, *, prior: bool, l2: float) -> None:
         """Refuse requests that no data can answer, before anything is read.
@@ -64,6 +67,13 @@ class Questions:
             raise ArgumentError(
                 "`pool` persons has its own intervals and errors, and no prior: leave out `prior`, `correct_bias`, "
                 "`intervals`, `bootstrap`, `profile` and `cross_validate`"
+            )
+        if self.person is not None and not prior:
+            raise ArgumentError("`person` goes with `prior`, a reward that was fitted with `pool` persons")
+        if self.person is not None and self._of_one_reward:
+            raise ArgumentError(
+                "`person` has its own intervals: leave out `correct_bias`, `intervals`, `bootstrap`, `profile` and "
+                "`cross_validate`"
             )
         if self.cross_validate and prior:
             raise ArgumentError(
@@ -130,6 +140,7 @@ def answers(
     found: Fit,
     questions: Questions,
     *,
+    others: Others | None = None,
     whole_paths: bool = True,
     executor: Executor | None = None,
     bars: Bars = no_bars,
@@ -140,6 +151,7 @@ def answers(
         evidence: The demonstrated steps of the fit.
         found: The fit.
         questions: The requested analyses.
+        others: Earlier people, where the reward is that of a new person.
         whole_paths: Whether all steps of each path count, so that the bias of the fit can be computed.
         executor: Where to compute; by default local processes.
         bars: Opens a progress bar for each analysis.
@@ -148,6 +160,9 @@ def answers(
         The fit, corrected if requested; the results; and the errors of analyses that failed. A failed analysis does not
         affect the fit.
     """
+    if questions.person is not None and others is not None:
+        found, ends = newcomer(evidence, others, questions.person, found)
+        return found, Analyses((ends,)), []
     if questions.pool is Pool.PERSONS:
         return _persons(evidence, found, executor, bars)
     lost: list[str] = []

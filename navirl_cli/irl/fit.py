@@ -1,7 +1,7 @@
 """Maximum-entropy inverse reinforcement learning: the parameters under which the demonstrations are most likely."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -65,8 +65,8 @@ class Fit(ByContent):
     path_log_likelihood: FloatArray
     #: (k,) bias that was subtracted, in the parameters' units; None without a correction.
     bias: FloatArray | None = None
-    #: (i, k) places on the profiles that the search for other maxima followed, in the parameters' units.
-    scanned: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    #: Places on the profiles that the search for other maxima followed, in units of the parameters' scales.
+    scanned: tuple[Point, ...] = ()
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -154,7 +154,7 @@ def fit(
     else:
         found, scanned = _by_newton(objective, first, free, scan, count)
     ended = _as_fit(objective, found, first, influential, held, (method, l2, prior))
-    return replace(ended, scanned=np.array([point.x * objective.scale for point in scanned]))
+    return replace(ended, scanned=tuple(scanned))
 
 
 def _as_fit(

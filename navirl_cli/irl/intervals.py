@@ -32,6 +32,8 @@ END_TOLERANCE, END_TRIES = 0.01, 40
 MOST_STEPS = 40
 #: Predicted gain at which a climb at a value ends, as a share of the fall: it shifts an end by half of this.
 ENOUGH = 2e-3
+#: Predicted gain at which the climb to the top ends, nats.
+TOP = 1e-4
 #: With fewer participants the scatter between them says too little for an interval: Student's quantile is 4.3 and more.
 FEWEST_PARTICIPANTS = 4
 #: How often an end is moved on because another branch of the other parameters reaches farther.
@@ -230,12 +232,14 @@ class _Profiler:
         objective = Objective.of(evidence, found.reward, l2, found.prior)
         top = estimate = objective(objective.to_units(found.reward.theta))
         if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere; the scan below finds others
-            top = maximise(objective, estimate, objective.bounds, free, effort=Effort(MOST_STEPS)).best
+            top = maximise(
+                objective, estimate, objective.bounds, free, effort=Effort(MOST_STEPS, TOP, strides=True)
+            ).best
         scans = [(j, values) for j, values in objective.scans() if free[j]]
-        seen, starts = [top, estimate], [objective.to_units(theta) for theta in found.scanned]
+        seen = [top, estimate]
         branched = len(scans) > 1
         for j, values in scans:
-            along = Scan(objective, objective.bounds, free, None, [_known(top)], fall, starts).follow(j, values)
+            along = Scan(objective, objective.bounds, free, None, [_known(top)], fall, found.scanned).follow(j, values)
             seen += along
             branched |= _has_several_peaks(along, j)
         best_seen = max(seen, key=lambda point: point.value)

@@ -9,9 +9,10 @@ from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.log_scale import LogScale, Witness
+from navirl_cli.irl.nodes import draw, laplace
 from navirl_cli.irl.population import person_of
 from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.random_effects import Spread, draw, laplace
+from navirl_cli.irl.spread import Spread
 from navirl_cli.irl.status import Status
 
 #: Times that the nodes are drawn again around the posterior that the last ones found.
@@ -27,14 +28,22 @@ class Others(ByContent):
     #: Mean of the logarithms, and standard deviation of the next person's: the scatter and the mean's error together.
     spread: Spread
 
+    def prior(self) -> Prior:
+        """The same in the parameters' units, to first order; nothing on parameters that are the same for all."""
+        theta, varying = np.array(self.scale.reward.theta), self.scale.varying
+        errors = np.full(len(theta), np.nan)
+        errors[varying] = self.spread.scatter * np.abs(theta[varying])
+        return Prior.gaussian(theta, np.diag(errors**2))
 
-def newcomer(evidence: Evidence, others: Others, name: str) -> tuple[Fit, Intervals]:
+
+def newcomer(evidence: Evidence, others: Others, name: str, plain: Fit | None = None) -> tuple[Fit, Intervals]:
     """The reward of a new person by this person's demonstrations and by the scatter between earlier people.
 
     Args:
         evidence: Demonstrations of this person alone.
         others: Earlier people.
         name: Of the person.
+        plain: A fit to the demonstrations with the Gaussian prior of :meth:`Others.prior`, where there is one.
 
     Returns:
         The fit, whose errors are those of the person, and its intervals.
@@ -43,19 +52,19 @@ def newcomer(evidence: Evidence, others: Others, name: str) -> tuple[Fit, Interv
         RewardError: The typical reward has no policy in a scene of the person.
     """
     scale, spread = others.scale, others.spread
+    if plain is None:
+        plain = fit(evidence, scale.reward, prior=others.prior(), scan=False)
     prior = Prior.l2(scale.reward.parameters, 0.0)
     one = Witness(name, evidence, scale, prior)
-    everything = [parameter.name for parameter in scale.reward.parameters]
-    held = fit(evidence, scale.reward, 0.0, fixed=everything, scan=False)
     known = laplace(one, spread, spread.mean)
     for _ in range(DRAWS):
         known = draw(one, known, spread).under(spread)
     person = person_of(one, known.mean, known.covariance, known, scale.reward)
     varying = scale.varying
-    covariance = np.full_like(held.covariance, np.nan)
+    covariance = np.full_like(person.covariance, np.nan)
     covariance[np.ix_(varying, varying)] = person.covariance[np.ix_(varying, varying)]
     found = replace(
-        held,
+        plain,
         reward=person.reward,
         covariance=covariance,
         clustered=None,
@@ -65,7 +74,7 @@ def newcomer(evidence: Evidence, others: Others, name: str) -> tuple[Fit, Interv
         log_likelihood=person.log_likelihood,
         objective=known.evidence,
         path_theta=np.array([scale.reward.theta, person.reward.theta]),
-        path_log_likelihood=np.array([held.log_likelihood, person.log_likelihood]),
+        path_log_likelihood=np.array([person.log_likelihood_typical, person.log_likelihood]),
     )
     low, high = person.lower[varying].tolist(), person.upper[varying].tolist()
     ends = tuple(Ends(*one) for one in zip(scale.names, low, high, strict=True))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 
 MAX_ITERATIONS = 200
 #: Where the Newton step predicts a smaller gain than this, in nats, the search has converged.
@@ -34,7 +34,7 @@ MIN_RADIUS = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(ByContent):
     """The objective at one place; value -inf where it does not exist."""
 
     x: FloatArray

@@ -19,8 +19,9 @@ from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.likelihood import log_likelihood
 from navirl_cli.irl.log_scale import LogScale, Witness
 from navirl_cli.irl.prior import Prior
-from navirl_cli.irl.random_effects import Posterior, RandomEffects, random_effects
+from navirl_cli.irl.random_effects import RandomEffects, random_effects
 from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.spread import Posterior
 from navirl_cli.irl.status import Status
 
 #: Half the width of a 95 % interval of a normal variable, in standard deviations.

@@ -18,6 +18,8 @@ from navirl_cli.irl.newton import Maximum, Point, maximise, moved
 #: Between two values the profile is taken to stay below the cubic through its values and slopes plus this, in nats, and
 #: plus this share of the cubic's rise above the lower value.
 WITHIN, SHARE = 0.3, 0.5
+#: A place so far below what is of interest need not be computed again under an objective that differs a little, nats.
+FAR = 10.0
 #: Rounds over several parameters: a better maximum by one may open another by the next.
 ROUNDS = 3
 
@@ -45,8 +47,8 @@ class Scan:
     found: list[Maximum]
     #: How far below the best place a value of the profile is still of interest, nats.
     fall: float = 0.0
-    #: Places to begin at where the profile is followed through their value of the variable.
-    starts: Sequence[FloatArray] = ()
+    #: Places on the profile of nearly the same objective: where to begin, or what to take where nothing is of interest.
+    starts: Sequence[Point] = ()
     #: Places found on profiles.
     visited: list[Point] = field(default_factory=list, init=False)
     _seen: dict[float, _Place] = field(default_factory=dict, init=False)
@@ -95,11 +97,15 @@ class Scan:
 
     def _visit(self, j: int, value: float) -> None:
         """The best of the other variables at a value of this one; nothing where there is no policy."""
+        known = next((one for one in self.starts if np.isclose(one.x[j], value, rtol=1e-12)), None)
+        if known is not None and known.value < self.top.value - self.fall - FAR:
+            self._seen[value] = _Place(known, float(known.gradient[j]) * value)
+            return
         last = self._seen[min(self._seen, key=lambda other: abs(np.log(other / value)))].point
         others = self.free & (np.arange(len(last.x)) != j)
         # Along the logarithm of the variable the best of the others moves more evenly.
         x = moved(last, j, float(last.x[j] * np.log(value / last.x[j])), self.bounds, others)
-        x = next((start for start in self.starts if np.isclose(start[j], value, rtol=1e-12)), x)
+        x = x if known is None else known.x
         begin = self.objective(np.where(np.arange(len(x)) == j, value, x))
         if not np.isfinite(begin.value):
             begin = self.objective(np.where(np.arange(len(x)) == j, value, last.x))

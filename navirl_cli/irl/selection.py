@@ -1,12 +1,13 @@
 """Which demonstrations and which of their steps a reward is learnt from."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from navirl_cli.arrays import BoolArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.reach import Reach, required_reach, steps_within_reach
+from navirl_cli.demos.subset import Subset
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.irl.evidence import Evidence, evidence_of
@@ -36,9 +37,8 @@ class Selection:
 
 def select(
     demonstrations: Sequence[Demonstration],
+    subset: Subset = Subset(),  # noqa: B008 - it is frozen
     *,
-    conditions: Collection[str] = (),
-    cycle: int | None = None,
     only_corrected: bool = False,
     truncated: bool = False,
     steps: Steps = Steps.ALL,
@@ -48,8 +48,7 @@ def select(
 
     Args:
         demonstrations: To choose from.
-        conditions: Values of :class:`~navirl_cli.demos.demonstration.Condition`; none for all.
-        cycle: Number of the cycle; None for all.
+        subset: By condition, cycle and the like; all by default.
         only_corrected: Only demonstrations in which the person intervened.
         truncated: Also demonstrations that are cut off.
         steps: All steps, those during contact, or those during contact or within reach; demonstrations without such
@@ -61,21 +60,30 @@ def select(
         Demonstrations in their order, and their steps.
 
     Raises:
-        DemonstrationError: No demonstration or step is left, the intervention is unknown, or the cells differ in size.
+        DemonstrationError: No demonstration or step is left, a name of the subset is unknown, the intervention is
+            unknown, or the cells differ in size.
         SceneError: A demonstration's scene has no path from start to goal.
     """
-    chosen = [
-        one
-        for one in demonstrations
-        if (not conditions or one.condition.value in conditions) and (cycle is None or one.cycle == cycle)
-    ]
-    if demonstrations and not chosen:
-        raise _not_among(demonstrations, conditions, cycle)
+    chosen = subset.of(demonstrations)
     if not truncated:
         chosen = whole(chosen)
     if only_corrected:
         chosen = _corrected(chosen)
     return with_steps(chosen, steps, reach_m)
+
+
+def of_participant(demonstrations: Sequence[Demonstration], person: str | None) -> Sequence[Demonstration]:
+    """The demonstrations of one participant; all of them for None.
+
+    Raises:
+        DemonstrationError: There are none of this participant.
+    """
+    if person is None:
+        return demonstrations
+    own = [one for one in demonstrations if one.participant == person]
+    if not own:
+        raise DemonstrationError(unknown("`person`", person, sorted({one.participant for one in demonstrations})))
+    return own
 
 
 def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None) -> Selection:
@@ -91,20 +99,6 @@ def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | N
     return Selection(
         tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen), reach
     )
-
-
-def _not_among(
-    demonstrations: Sequence[Demonstration], conditions: Collection[str], cycle: int | None
-) -> DemonstrationError:
-    """The error that no demonstration has the conditions and the cycle; it lists the existing ones."""
-    arguments = [*(["`condition`"] if conditions else []), *([] if cycle is None else ["`cycle`"])]
-    asked = [*([" or ".join(conditions)] if conditions else []), *([] if cycle is None else [f"cycle {cycle}"])]
-    there: dict[str, None] = {}
-    for one in demonstrations:
-        own_cycle = "no cycle" if one.cycle is None else f"cycle {one.cycle}"
-        own = [*([one.condition.value] if conditions else []), *([] if cycle is None else [own_cycle])]
-        there[", ".join(own)] = None
-    return DemonstrationError(unknown(" and ".join(arguments), ", ".join(asked), sorted(there)))
 
 
 def whole(chosen: Sequence[Demonstration]) -> list[Demonstration]:

@@ -143,6 +143,8 @@ def _light(image: "Image") -> tuple[NDArray[Any], NDArray[Any] | None, int]:
         return 3 * grey, None if clear is None else np.where(grey == clear, 0, 65535), 65535
     if image.mode == "F":
         raise ValueError("its numbers are not colours")
+    if image.mode in {"1", "L"} and not image.has_transparency_data:
+        return 3 * np.asarray(image.convert("L")).astype(np.uint16), None, 255
     if not image.has_transparency_data:
         return np.asarray(image.convert("RGB")).sum(axis=2, dtype=np.uint16), None, 255
     channels = np.asarray(image.convert("RGBA"))
@@ -166,7 +168,10 @@ def _cells(light: NDArray[Any], alpha: NDArray[Any] | None, full: int, colours: 
         if colours.mode == "scale":
             between = np.rint((occupied - colours.free) / (colours.occupied - colours.free) * 100)
         table = np.where(occupied > colours.occupied, 100, np.where(occupied < colours.free, 0, between))
-    cells: _Cells = table.astype(np.int8)[light]
+    table, cells = table.astype(np.int8), np.empty(light.shape, dtype=np.int8)
+    for row in range(len(cells)):
+        # numpy makes wide indices of these, eight bytes a cell
+        cells[row] = table[light[row]]
     if colours.mode == "scale" and alpha is not None:
         cells[alpha != full] = -1
     return cells

@@ -16,7 +16,8 @@ from navirl_cli.logs.container.sniff import CONVERT, check_path
 from navirl_cli.logs.yaml_file import read_mapping
 from navirl_cli.remote import Remote, path_of
 
-_METADATA: Final = "metadata.yaml"
+#: What rosbag2 writes when a recording ends.
+METADATA: Final = "metadata.yaml"
 _INFO: Final = "rosbag2_bagfile_information"
 #: A recording's file name; the group leaves out the ending of whole-file compression.
 _MCAP: Final = re.compile(r"(.*\.mcap)(?:\.(?:zstd|zst|lz4))?", re.IGNORECASE | re.DOTALL)
@@ -143,7 +144,7 @@ def _recordings(folder: Path, seen: set[Path], errors: list[LogError]) -> list[S
     seen.add(here)
     entries = _listing(folder)
     files = [entry for entry in entries if _MCAP.fullmatch(entry.name) and not _is_folder(entry)]
-    bag = _of_metadata(folder, here.name, files) if folder / _METADATA in entries else Source(here.name, ())
+    bag = _of_metadata(folder, here.name, files) if folder / METADATA in entries else Source(here.name, ())
     if bag.files:
         return [bag]
     found = _loose(folder, here.name, files)
@@ -163,7 +164,7 @@ def _recordings(folder: Path, seen: set[Path], errors: list[LogError]) -> list[S
 def _of_metadata(folder: Path, name: str, files: Sequence[Path]) -> Source:
     """The recording that metadata.yaml describes; without files where it is unusable or all its files are missing."""
     try:
-        listed, info = _listed(folder / _METADATA)
+        listed, info = _listed(folder / METADATA)
     except LogError as error:
         return Source(name, (), (), (str(error),))
     _refuse_foreign(folder, listed, info)

@@ -37,7 +37,7 @@ def read_mapping(path: Path, remedy: str) -> dict[Any, Any]:
     except OSError as error:
         raise LogError(f"{path}: expected a YAML file, found: {error.strerror}; {remedy}") from error
     # ruamel also raises the errors of int(), datetime() and deep nesting
-    except (YAMLError, ValueError, LookupError, RecursionError) as error:
+    except (YAMLError, ValueError, LookupError, RecursionError, OverflowError) as error:
         raise LogError(f"{expected} {_problem(error)}; {remedy}") from error
     if document is None:
         raise LogError(f"{expected} an empty file; {remedy}")

@@ -16,8 +16,8 @@ import numpy as np
 from navirl_cli.arrays import BoolArray, FloatArray, IntArray
 from navirl_cli.demos.grid import moves_along
 from navirl_cli.errors import SceneError
-from navirl_cli.evaluation.compare import PERSON_RADIUS_M
 from navirl_cli.evaluation.lines import Lines
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.evaluation.policy_paths import PolicyLines, Steps
 from navirl_cli.irl.graph import Graph
 from navirl_cli.irl.likelihood import policy_of

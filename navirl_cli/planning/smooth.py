@@ -76,16 +76,14 @@ def smoothed(problem: Problem, line_m: FloatArray, tolerance_m: float, limits: L
     room = np.full(len(rough), max(tolerance_m - _RESERVE_M, 0.0))
     room[[0, -1]] = 0.0
     for _ in range(_SEARCHES):
-        fine = _band(rough, room, problem.scene.people_m, keep, grid)
-        wrong = _wrong(fine, rough, room, problem, keep)
-        if not wrong.any():
-            break
+        for fine in _band(rough, room, problem.scene.people_m, keep, grid):
+            wrong = _wrong(fine, rough, room, problem, keep)
+            if not wrong.any():
+                return _timed(fine, float(np.hypot(*(fine - rough).T).max()), limits)
         # tighter where a rule is broken and around it
         around = np.convolve(wrong, np.ones(5), mode="same") > 0
         room = np.where(around, room / 4, room)
-    else:
-        fine = rough
-    return _timed(fine, float(np.hypot(*(fine - rough).T).max()), limits)
+    return _timed(rough, 0.0, limits)
 
 
 def _least_distances_m(line_m: FloatArray, people_m: FloatArray) -> FloatArray:
@@ -93,8 +91,10 @@ def _least_distances_m(line_m: FloatArray, people_m: FloatArray) -> FloatArray:
     return np.array([Segments(line_m[:-1], line_m[1:], one[None], 0.0).least_m.min() for one in people_m])
 
 
-def _band(rough: FloatArray, room: FloatArray, people_m: FloatArray, keep: FloatArray, grid: Grid) -> FloatArray:
-    """(n, 2) the line with the least bending whose points are in their sets."""
+def _band(
+    rough: FloatArray, room: FloatArray, people_m: FloatArray, keep: FloatArray, grid: Grid
+) -> tuple[FloatArray, FloatArray]:
+    """(n, 2) the line with the least bending whose points are in their sets, smooth and nearly so, or exactly so."""
     from scipy.linalg import cho_solve_banded, cholesky_banded
 
     weight = np.ones((len(rough), 1))
@@ -105,10 +105,9 @@ def _band(rough: FloatArray, room: FloatArray, people_m: FloatArray, keep: Float
         line = cho_solve_banded((factor, False), (allowed - dual) * weight)
         allowed = _projected(line + dual, rough, room, people_m, keep, grid)
         dual += line - allowed
-    smooth: FloatArray = line
     tight = room <= _RESERVE_M
-    smooth[tight] = rough[tight]
-    return smooth
+    line[tight] = allowed[tight] = rough[tight]
+    return line, allowed
 
 
 def _bending_bands(count: int) -> FloatArray:
@@ -156,7 +155,7 @@ def _wrong(fine: FloatArray, rough: FloatArray, room: FloatArray, problem: Probl
         near = Segments(starts, ends, person[None], 0.0).least_m < least - 1e-9
         wrong[:-1] |= near
         wrong[1:] |= near
-    for share in np.linspace(0, 1, 6):
+    for share in np.linspace(0, 1, 21):
         on = starts + share * (ends - starts)
         away = on - (rough[:-1] + share * np.diff(rough, axis=0))
         blocked = grid.is_occupied(grid.cells_of(on)) & (np.hypot(*away.T) > _CORNER_M)

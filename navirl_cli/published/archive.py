@@ -10,11 +10,13 @@ from typing import IO, Final, cast
 
 from navirl_cli.errors import ArtefactError
 from navirl_cli.files import open_regular
+from navirl_cli.limits import FREE_BYTES, lifted
 
-#: Limits: bytes of a file, of the unpacked archive, and of a member's header; number of members. A published file takes
-#: a quarter of a megabyte.
+#: Limits: bytes of a file, of the unpacked archive, unpacked bytes for each of the archive beyond what every file may
+#: unpack to, and bytes of a member's header; number of members. A published file takes a quarter of a megabyte.
 MOST_OF_A_FILE: Final = 64 << 20
 MOST_IN_ALL: Final = 1 << 30
+RATIO: Final = 100
 MOST_OF_A_HEADER: Final = 4096
 MOST_MEMBERS: Final = 2000
 
@@ -24,10 +26,16 @@ _CHUNK: Final = 1 << 20
 
 
 class _Forward:
-    """A stream from which tarfile reads headers: forward only, in small pieces, and not beyond a gigabyte."""
+    """A stream from which tarfile reads headers: forward only, in small pieces, and not beyond a limit.
 
-    def __init__(self, stream: IO[bytes]) -> None:
+    Args:
+        stream: The archive, decompressed.
+        most: The limit, bytes.
+    """
+
+    def __init__(self, stream: IO[bytes], most: int) -> None:
         self._stream = stream
+        self._most = most
         #: The bytes read last.
         self.last = b""
 
@@ -39,8 +47,8 @@ class _Forward:
         """Go forward to a place."""
         if place < self.tell():
             raise tarfile.ReadError("a member that leads back")
-        if place > MOST_IN_ALL:
-            raise tarfile.ReadError(f"more than {MOST_IN_ALL >> 20} MB unpacked")
+        if place > self._most:
+            raise tarfile.ReadError(f"more than {self._most >> 20} MB unpacked")
         return self._stream.seek(place)
 
     def read(self, size: int) -> bytes:
@@ -52,6 +60,8 @@ class _Forward:
 
     def content(self, member: tarfile.TarInfo) -> bytes:
         """A member's bytes, which follow its header."""
+        if self.tell() + member.size > self._most:
+            raise tarfile.ReadError(f"more than {self._most >> 20} MB unpacked")
         data = self._stream.read(member.size)
         if len(data) < member.size:
             raise tarfile.ReadError("its end within a member")
@@ -83,7 +93,8 @@ def files_in(archive: Path, wanted: Callable[[str], bool]) -> tuple[dict[PurePos
     lost = []
     try:
         with ExitStack() as stack:
-            stream = _Forward(_opened(archive, stack))
+            in_proportion = MOST_IN_ALL if lifted() else FREE_BYTES + RATIO * archive.stat().st_size
+            stream = _Forward(_opened(archive, stack), min(MOST_IN_ALL, in_proportion))
             for member in _members(stream):
                 path = PurePosixPath(member.name)
                 if member.size > MOST_OF_A_FILE:

@@ -11,7 +11,7 @@ from navirl_cli.artefacts.metrics import Pairs
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.documents.tables import ENDINGS, Cell, Column, Format, Interval, Spread, Table, written
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
-from navirl_cli.evaluation.groups import GroupMetrics
+from navirl_cli.evaluation.groups import GroupMetrics, quantiles_of
 from navirl_cli.evaluation.metrics import METRICS, Metric
 from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Ranking
@@ -37,6 +37,8 @@ def evaluation_text(
     ranked: Ranking,
     metrics: Sequence[Metric],
     how: Format,
+    *,
+    quantiles: Sequence[float] = (),
 ) -> str:
     """Everything in one format.
 
@@ -46,6 +48,7 @@ def evaluation_text(
         ranked: Ranks of demonstrations.
         metrics: That were asked for.
         how: The format; CSV holds the groups only, with one number a column.
+        quantiles: Shares that were asked for.
     """
     if how is Format.CSV:
         return written(_numbers(result, metrics), how)
@@ -53,6 +56,7 @@ def evaluation_text(
     tables = [
         *(_side_by_side(result, metrics) if wide else _below_each_other(result, metrics)),
         *([_intervals(result, metrics)] if wide else []),
+        *([_quantiles(result, metrics, quantiles)] if quantiles else []),
         *(_paired(one, other, found, metrics) for one, other, found in pairs),
         *([group_ranks_table(ranked.ranks), rank_table(ranked.ranks)] if ranked.ranks else []),
     ]
@@ -196,6 +200,24 @@ def _interval(row: GroupMetrics, name: str) -> Interval:
     return Interval(mean - half, mean + half)
 
 
+def _quantiles(result: Comparison, metrics: Sequence[Metric], shares: Sequence[float]) -> Table:
+    """Quantiles by group and type of path."""
+    columns = (
+        Column("group"),
+        Column("path_type", "paths"),
+        Column("n"),
+        Column("share", "quantile", 3),
+        *(Column(metric.name, metric.heading, DECIMALS) for metric in metrics),
+    )
+    rows = [
+        (own.group, own.path_type, own.count, share, *(values.get(metric.name) for metric in metrics))
+        for own in quantiles_of(result.rows, [metric.name for metric in metrics], shares)
+        for share, values in own.values.items()
+    ]
+    note = "Over demonstrations; of learnt paths over the expected values in their scenes. 0.5 is the median."
+    return Table(columns, tuple(rows), "Quantiles", note)
+
+
 def _numbers(result: Comparison, metrics: Sequence[Metric]) -> Table:
     """The groups with a column for each number, and the reasons for missing ones."""
     columns = [Column("group"), Column("path_type"), Column("n")]
@@ -213,6 +235,7 @@ def _numbers(result: Comparison, metrics: Sequence[Metric]) -> Table:
 
 def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence[Metric]) -> Table:
     """Differences by metric."""
+    corrected = any(pair.holm_p is not None for pair in found.values())
     columns = (
         Column("metric"),
         Column("mean_difference", "mean difference", DECIMALS, sign=True),
@@ -220,6 +243,7 @@ def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence
         Column("bootstrap_interval", "95 % interval (bootstrap)", DECIMALS, sign=True),
         Column("n"),
         Column("wilcoxon_p", "p (Wilcoxon)", 4),
+        *([Column("holm_p", "p (Holm)", 4)] if corrected else []),
         Column("cohen_dz", "Cohen's d_z", 2),
         Column("rank_biserial", "rank-biserial r", 2),
     )
@@ -232,12 +256,14 @@ def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence
             None if pair.bootstrap is None else Interval(*pair.bootstrap),
             pair.n,
             pair.wilcoxon_p,
+            *([pair.holm_p] if corrected else []),
             pair.cohen_dz,
             pair.rank_biserial,
         )
         for metric, pair in known
     )
-    return Table(columns, rows, f"{one} - {other}, driven paths, paired by participant", _paired_note(known, metrics))
+    paths = "" if other.startswith(LEARNT) else ", driven paths"
+    return Table(columns, rows, f"{one} - {other}{paths}, paired by participant", _paired_note(known, metrics))
 
 
 def _paired_note(known: Sequence[tuple[Metric, Paired]], metrics: Sequence[Metric]) -> str:
@@ -246,6 +272,8 @@ def _paired_note(known: Sequence[tuple[Metric, Paired]], metrics: Sequence[Metri
     there = {metric.name for metric, _ in known}
     lacking = [metric.label for metric in metrics if metric.name not in there]
     notes = []
+    if any(pair.holm_p is not None for pair in pairs):
+        notes.append("p (Holm) is corrected for all tests of these tables.")
     if any(pair.n < FEWEST for pair in pairs):
         notes.append(f"A bootstrap interval needs {FEWEST} participants, Student's interval 2.")
     if any(not isfinite(pair.wilcoxon_p) for pair in pairs):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from navirl_cli.documents.tables import Column, Table
-from navirl_cli.evaluation.ranks import EXTREME, RARE, Rank, Ranking, by_group_and_training, uniformity
+from navirl_cli.evaluation.ranks import EXTREME, RARE, Rank, Ranking, by_group_and_training
 
 _DECIMALS = 3
 _NOTE = (
@@ -36,7 +36,7 @@ def group_ranks_table(ranks: Sequence[Rank]) -> Table:
             (
                 own.name,
                 len(own.ranks),
-                *uniformity(own.ranks),
+                *own.uniformity(),
                 float(np.median([one.rank for one in own.ranks])),
                 float(np.median(distances)) if distances else None,
                 float(np.median([one.area_rank for one in own.ranks])),

@@ -19,10 +19,11 @@ from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.planning.problem import problem_of
 from navirl_cli.reports.evaluation import group_table
-from navirl_cli.reports.evidence import evidence_remarks, reach_line
+from navirl_cli.reports.evidence import reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
+    cannot_learn,
     correlation_table,
     formula,
     interval_notes,
@@ -31,9 +32,11 @@ from navirl_cli.reports.fit import (
     parameter_table,
     people,
     profile_table,
+    remarks,
     validation_tables,
     warnings,
 )
+from navirl_cli.reports.made import Made, made_blocks
 from navirl_cli.reports.persons import person_blocks
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 from navirl_cli.reports.recommendation import recommendation_blocks
@@ -42,12 +45,12 @@ from navirl_cli.reports.repeated import repeated
 _CAPTIONS = {
     "paths": "Driven paths by condition; the line is thicker where the person pushed.",
     "policy": "Expected visits of every cell under the learnt policy, and the reward of every cell.",
-    "properties": "Properties of driven and learnt paths by group: mean and standard deviation.",
+    "properties": "Properties of driven and learnt paths by group: mean, its 95 % interval and standard deviation.",
     "profile": "Profile likelihoods: how fast the likelihood falls on both sides of the estimate.",
 }
-#: The metrics of the paper and two more.
 #: A lower end this many times smaller than a positive quantity does not bound it.
 NOTHING = 1e-3
+#: The metrics of the paper and two more.
 METRICS = [*PAPER_METRICS, *(BY_NAME[name] for name in ("compliance", "personal_share"))]
 
 
@@ -59,7 +62,7 @@ def report_of(
     ranked: Ranking,
     figures: Mapping[str, Path],
     made_from: Sequence[Mapping[str, str]],
-    seed: int,
+    made: Made,
 ) -> Report:
     """Compose the page.
 
@@ -71,13 +74,13 @@ def report_of(
         ranked: Ranks of the demonstrations among the policy's paths.
         figures: Files by name.
         made_from: Files and hashes.
-        seed: Of the intervals.
+        made: How it was made; its seed is that of the intervals.
     """
-    notes = repeated(demonstrations)
+    notes, seed = repeated(demonstrations), made.seed
     blocks: list[Block] = [
         Paragraph(_summary(demonstrations, learnt, content)),
         *_recommendation(demonstrations, learnt, seed),
-        *_warnings(demonstrations, learnt, content, ranked),
+        *_warnings(made.everyone, learnt, content, ranked),
         Heading("Parameters"),
         formula(learnt.reward.terms),
         parameter_table(content),
@@ -103,6 +106,7 @@ def report_of(
         Heading("Trials"),
         trial_table(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
+        *made_blocks(content, made),
         Heading("Sources"),
         Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
     ]
@@ -174,7 +178,13 @@ def _warnings(
 ) -> list[Block]:
     """What a reader should know before trusting the numbers."""
     taught = [one for one in demonstrations if one.id in learnt.demonstrations]
-    said = [*evidence_remarks(taught, demonstrations), *warnings(content)]
+    conditions = {one.condition.value for one in taught}
+    chosen_by = tuple(conditions) if len(conditions) == 1 else ()
+    said = [
+        *cannot_learn(taught),
+        *remarks(taught, None, chosen_by=chosen_by, everyone=demonstrations),
+        *warnings(content),
+    ]
     lines = [f"{line[0].upper()}{line[1:]}." if line.split()[0].isalpha() else f"{line}." for line in said]
     bad = ", ".join(one.id for one in ranked.bad)
     if bad:
@@ -183,4 +193,15 @@ def _warnings(
 
 
 def _pictures(figures: Mapping[str, Path], *names: str) -> list[Block]:
-    return [Picture(figures[name], _CAPTIONS[name]) for name in names if name in figures]
+    """The figures of these names, with those for dark and for narrow screens."""
+    return [
+        Picture(
+            figures[name],
+            _CAPTIONS[name],
+            dark=figures.get(f"{name}_dark"),
+            narrow=figures.get(f"{name}_narrow"),
+            narrow_dark=figures.get(f"{name}_narrow_dark"),
+        )
+        for name in names
+        if name in figures
+    ]

@@ -33,7 +33,8 @@ FIGURES: Mapping[str, str] = {
     "fig3_paths": "Paths that a person influenced, by condition (as the paper's Fig. 3).",
     "fig4_answers": "Answers to the questionnaire (as the paper's Figs. 4 and 6).",
     "fig5_replays": "Paths that the robot drove autonomously (as the paper's Fig. 5).",
-    "fig7_properties": "Path properties by condition: mean and standard deviation over paths (as the paper's Fig. 7).",
+    "fig7_properties": "Path properties by condition: mean, its 95 % interval, and standard deviation over paths "
+    "(as the paper's Fig. 7).",
     "fig8_pooled": "The reward learnt from all second cycles, in their scene: propagated policy and state reward (as "
     "the paper's Fig. 8).",
     "fig9_unseen": "The same reward in scenes without demonstrations: two people in the hallway; a person beside a "

@@ -21,7 +21,6 @@ from navirl_cli.parallel import map_in_order
 from navirl_cli.simulation import protocol, sensors
 from navirl_cli.simulation.behaviour import Behaviour
 from navirl_cli.simulation.driving import GAIN_S_KG, STEP_S, Drive
-from navirl_cli.simulation.hallway import GOAL_X_M, LANE_Y_M
 from navirl_cli.simulation.person import STICK_M_S
 
 #: Name of the metadata record that holds the truth; only tests read it.
@@ -97,6 +96,7 @@ def write_logs(
     *,
     force: bool,
     behaviour: Behaviour | None = None,
+    driven_m: FloatArray | None = None,
     progress: Callable[[int, str], None] | None = None,
     executor: Executor | None = None,
 ) -> list[Simulated]:
@@ -108,33 +108,45 @@ def write_logs(
         seed: Of the study.
         force: Replace existing files.
         behaviour: How people intervene.
+        driven_m: (k, 2) m, map frame: a path that the robot drives in place of the two cycles.
         progress: Called with the number of logs written and the name of the last.
         executor: Where to simulate; by default local processes.
 
     Raises:
         ArtefactError: A log exists already, or cannot be written.
+        SceneError: The path cannot be driven in the hallway.
     """
     jobs = [(number, folder / f"p{number:02d}.mcap") for number in range(1, participants + 1)]
     written = []
     with new_folder(folder):
         for _, path in jobs:
             check_writable(path, force=force)
-        for one in map_in_order(partial(_simulated, seed=seed, behaviour=behaviour, force=force), jobs, executor):
+        for one in map_in_order(
+            partial(_simulated, seed=seed, behaviour=behaviour, driven_m=driven_m, force=force), jobs, executor
+        ):
             written.append(one)
             if progress is not None:
                 progress(len(written), one.path.name)
     return written
 
 
-def _simulated(job: tuple[int, FilePath], seed: int, behaviour: Behaviour | None, *, force: bool) -> Simulated:
+def _simulated(
+    job: tuple[int, FilePath], seed: int, behaviour: Behaviour | None, driven_m: FloatArray | None, *, force: bool
+) -> Simulated:
     """Write the log of one participant."""
     number, path = job
-    session = write_log(number, seed, path, behaviour, force=force)
+    session = write_log(number, seed, path, behaviour, driven_m, force=force)
     return Simulated(path, len(session.passes), path.stat().st_size)
 
 
 def write_log(
-    number: int, seed: int, path: FilePath, behaviour: Behaviour | None = None, *, force: bool
+    number: int,
+    seed: int,
+    path: FilePath,
+    behaviour: Behaviour | None = None,
+    driven_m: FloatArray | None = None,
+    *,
+    force: bool,
 ) -> protocol.Session:
     """Simulate a participant and write the log.
 
@@ -143,15 +155,18 @@ def write_log(
         seed: Of the study.
         path: The log to write.
         behaviour: How the person intervenes.
+        driven_m: (k, 2) m, map frame: a path that the robot drives in place of the two cycles.
         force: Whether to replace an existing file.
 
     Returns:
         The session.
     """
-    session = protocol.session(number, seed, behaviour)
+    session = protocol.session(number, seed, behaviour, driven_m)
     line = lay_out(session)
     rng = np.random.default_rng([seed, number, 1])
-    t_ns = EPOCH_NS + number * HOUR_NS + np.arange(line.steps, dtype=np.int64) * round(STEP_S * 1e9)
+    # a given path is driven later in the same visit
+    begin_ns = EPOCH_NS + number * HOUR_NS + (0 if driven_m is None else HOUR_NS // 2)
+    t_ns = begin_ns + np.arange(line.steps, dtype=np.int64) * round(STEP_S * 1e9)
     with LogWriter(path, force=force) as writer:
         _write(writer, session, line, t_ns, rng)
     return session
@@ -232,7 +247,7 @@ def _write_passes(writer: LogWriter, session: protocol.Session, line: Timeline, 
     stamped = message_type("geometry_msgs/msg/PoseStamped")
     for one, (announced, _, _) in zip(session.passes, line.spans, strict=True):
         head = header(clock.t_ns[announced], "map")
-        writer.message("/goal_pose", stamped(head, planar_pose(GOAL_X_M, LANE_Y_M, 0.0)), clock.at(announced))
+        writer.message("/goal_pose", stamped(head, planar_pose(*session.goal_m, 0.0)), clock.at(announced))
         points = [stamped(head, planar_pose(x, y, 0.0)) for x, y in one.plan.xy_m[::4]]
         writer.message("/plan", message_type("nav_msgs/msg/Path")(head, points), clock.at(announced + 1))
 
@@ -298,7 +313,11 @@ def _truth(
     names = [parameter.name for parameter in session.truth.parameters]
     return {
         "theta": dict(zip(names, session.truth.theta, strict=True)),
-        "theta_learnt_between_cycles": dict(zip(names, session.learnt.theta, strict=True)),
+        **(
+            {}
+            if session.learnt is None
+            else {"theta_learnt_between_cycles": dict(zip(names, session.learnt.theta, strict=True))}
+        ),
         **({"behaviour": changed} if (changed := session.behaviour.changed()) else {}),
         "step_s": STEP_S,
         "trials": [

@@ -7,6 +7,7 @@ import numpy as np
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.rasterize import rasterize
+from navirl_cli.errors import SceneError
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
@@ -56,10 +57,12 @@ class Session:
     hallway: Hallway
     #: The participant's true reward.
     truth: Reward
-    #: The reward learnt after the first cycle.
-    learnt: Reward
+    #: The reward learnt after the first cycle; None where a given path was driven.
+    learnt: Reward | None
     passes: tuple[Pass, ...]
     behaviour: Behaviour = field(default_factory=Behaviour)
+    #: (2,) m, map frame: the goal that is announced.
+    goal_m: tuple[float, float] = (GOAL_X_M, LANE_Y_M)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,19 +80,25 @@ class Someone:
         return person.Hand(wanted, self.hallway.person_m, self.rng, on_robot, self.behaviour, judged, plan)
 
 
-def session(number: int, seed: int, behaviour: Behaviour | None = None) -> Session:
+def session(number: int, seed: int, behaviour: Behaviour | None = None, driven_m: FloatArray | None = None) -> Session:
     """Simulate a participant's session.
 
     Args:
         number: Of the participant, from 1.
         seed: Of the whole study; the same seed gives the same session.
         behaviour: How the person intervenes.
+        driven_m: (k, 2) m, map frame: a path that the robot drives in place of the two cycles, as in :func:`_driven`.
+
+    Raises:
+        SceneError: The robot cannot drive that path in the hallway.
     """
     behaviour = behaviour or Behaviour()
     rng = np.random.default_rng([seed, number])
     hallway = Hallway.with_person(rng)
     truth = person.personal_reward(rng, behaviour.scatter)
     someone = Someone(hallway, truth, behaviour, rng)
+    if driven_m is not None:
+        return _driven(someone, f"p{number:02d}", driven_m)
     first = [pushed(someone, nominal_path(), offset, 1) for offset in _either_first(rng)]
     demonstrations = [as_demonstration(hallway, one, f"{number}/{i}") for i, one in enumerate(first)]
     exact = fit(evidence_of(demonstrations), Reward.named({})).reward.theta
@@ -101,6 +110,47 @@ def session(number: int, seed: int, behaviour: Behaviour | None = None) -> Sessi
     around = Path.along(avoidance_line_m(scene, ROBOT_RADIUS_M + PERSON_RADIUS_M), person.SMOOTHING_M / 2)
     alone = Pass(Condition.AUTONOMOUS, None, around, drive(around, around.xy_m[0], person.no_hand))
     return Session(f"p{number:02d}", hallway, truth, learnt, (*first, *second, *joystick, alone), behaviour)
+
+
+def _driven(someone: Someone, name: str, line_m: FloatArray) -> Session:
+    """A session along a given path: two passes of the second cycle, and one in which nobody pushes."""
+    hallway, truth = someone.hallway, someone.truth
+    _check_drivable(hallway, line_m)
+    plan = Path.along(line_m)
+    ends = hallway.free.cells_of(line_m[[0, -1]])
+    scene = Scene.on(hallway.free, ends[0], ends[1], hallway.person_m[None])
+    passes = []
+    for _ in range(2):
+        side = person.side_of(plan.xy_m, hallway.person_m)
+        wanted = person.sampled_path(scene, truth, someone.rng, side)
+        hand = someone.hand(wanted, plan, scene, on_robot=True)
+        passes.append(Pass(Condition.FORCE, 2, plan, drive(plan, plan.xy_m[0], hand), wanted))
+    passes.append(Pass(Condition.AUTONOMOUS, None, plan, drive(plan, plan.xy_m[0], person.no_hand)))
+    x, y = line_m[-1].tolist()
+    return Session(name, hallway, truth, None, tuple(passes), someone.behaviour, (x, y))
+
+
+def _check_drivable(hallway: Hallway, line_m: FloatArray) -> None:
+    """Refuse a path that leaves the hallway or touches the person.
+
+    Raises:
+        SceneError: It does.
+    """
+    cells = hallway.free.cells_of(line_m)
+    inside = np.array([hallway.free.contains(cell) and not hallway.free.is_occupied(cell) for cell in cells])
+    if not inside.all():
+        x, y = line_m[np.argmin(inside)]
+        raise SceneError(
+            f"`drive`: expected a path through free space of the simulated hallway, found x {x:.2f} m, y {y:.2f} m "
+            "in an obstacle or outside; plan it on the map of a simulated log"
+        )
+    nearest = float(np.hypot(*(Path.along(line_m).xy_m - hallway.person_m).T).min())
+    if nearest < ROBOT_RADIUS_M + PERSON_RADIUS_M:
+        x, y = hallway.person_m
+        raise SceneError(
+            f"`drive`: expected a path around the simulated person at x {x:.2f} m, y {y:.2f} m, found one that touches "
+            f"them ({nearest:.2f} m between centres); plan it in the scene of a simulated log with the same `seed`"
+        )
 
 
 def drive_back(from_m: FloatArray, to_m: FloatArray) -> Drive:

@@ -12,7 +12,7 @@ FIGURES = {
     "reward": ("maps", "Draw the learnt reward of every cell."),
     "value": ("maps", "Draw the soft value of every cell, with contour lines."),
     "actions": ("maps", "Draw the most likely move in every cell as an arrow."),
-    "properties": ("driven", "Draw length, distance and area of paths as bars, by group."),
+    "properties": ("driven", "Draw length, distance and area of paths by group."),
     "forces": ("driven", "Draw the forces of one trial, over time and along its path."),
     "compare": ("compare", "Draw several rewards, or several groups, side by side."),
     "ranks": ("compare", "Draw how demonstrations rank among paths of the policy."),

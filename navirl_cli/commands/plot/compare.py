@@ -8,13 +8,23 @@ import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
 from navirl_cli.commands import completion
-from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, progress_bar, samples_option, say, seed_option
+from navirl_cli.commands.choosing import Choosing, choice_options
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, scene_of, trial_option
+from navirl_cli.commands.shared import (
+    demonstrations_in,
+    demos_argument,
+    person_option,
+    progress_bar,
+    samples_option,
+    say,
+    seed_option,
+)
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example, Function, section
+from navirl_cli.commands.usage import Command, Example, Function, refuse_unused, section
 
 if TYPE_CHECKING:
     from navirl_cli.demos.demonstration import Demonstration
+    from navirl_cli.irl.reward import Reward
 
 
 def _group_option(count: str) -> Callable[[Function], Function]:
@@ -39,9 +49,19 @@ def _group_option(count: str) -> Callable[[Function], Function]:
 )
 @page_options
 @demos_argument
+@choice_options(reward=True)
 @section("Demonstrations", _group_option("repeatable; by default the groups that the reward was learnt from"))
-@section("Learnt paths", reward_option, samples_option(), seed_option)
-def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], samples: int, seed: int) -> None:
+@section("Learnt paths", reward_option, person_option, samples_option(), seed_option)
+def ranks(
+    page: Page,
+    demos: Path,
+    choosing: Choosing,
+    reward: Path,
+    person: str | None,
+    groups: tuple[str, ...],
+    samples: int,
+    seed: int,
+) -> None:
     """Draw how demonstrations rank among paths of the policy.
 
     Ranks are by log-likelihood, with a panel for each group. They are uniform if the policy is right.
@@ -53,13 +73,14 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
     from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
     from navirl_cli.reports.ranks import rank_lines
 
-    demonstrations = demonstrations_in(demos)
-    learnt = read_reward_for(reward, demonstrations)
-    trained = learnt.trained(demonstrations)
-    others: dict[str, int] = {}
+    everyone = demonstrations_in(demos)
+    learnt = read_reward_for(reward, everyone, person)
+    trained = learnt.trained(everyone)
+    demonstrations = choosing.subset.of(everyone)
+    chosen, others = demonstrations, dict[str, int]()
     if groups:
         chosen = [one for own in groups_named(demonstrations, groups) for one in own]
-    else:
+    elif not (choosing.subset.names or choosing.everything):
         check_to_rank(demonstrations, trained)
         chosen, others = chosen_to_rank(demonstrations, trained)
     rng = np.random.default_rng(seed)
@@ -82,6 +103,7 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
 )
 @page_options
 @demos_argument
+@choice_options(reward=True, trial=False)
 @section(
     "Compared",
     click.option("--reward", "rewards", multiple=True, type=FilePath, help="Learnt reward; give two or more."),
@@ -89,7 +111,13 @@ def ranks(page: Page, demos: Path, reward: Path, groups: tuple[str, ...], sample
 )
 @section("Scene", trial_option, crop_option)
 def compare(
-    page: Page, demos: Path, rewards: tuple[Path, ...], groups: tuple[str, ...], trial: str | None, crop: bool
+    page: Page,
+    demos: Path,
+    choosing: Choosing,
+    rewards: tuple[Path, ...],
+    groups: tuple[str, ...],
+    trial: str | None,
+    crop: bool,
 ) -> None:
     """Draw several rewards, or several groups, side by side.
 
@@ -100,11 +128,14 @@ def compare(
         raise click.UsageError("compare needs two or more --reward, or two or more --group.")
     if groups and trial is not None:
         raise click.UsageError("--trial selects the scene of --reward; --group draws all trials of the groups.")
-    demonstrations = demonstrations_in(demos)
+    refuse_unused("--reward", "everything", used=bool(rewards))
+    everyone = demonstrations_in(demos)
     if groups:
-        _draw_groups(page, demonstrations, groups, crop=crop)
-    else:
-        _draw_rewards(page, demonstrations, rewards, trial, crop=crop)
+        _draw_groups(page, choosing.of(everyone), groups, crop=crop)
+        return
+    learnt = [read_reward_for(path, everyone) for path in rewards]
+    one, _ = scene_of(choosing, everyone, learnt, trial)
+    _draw_rewards(page, one, rewards, [found.reward for found in learnt], crop=crop)
 
 
 def _draw_groups(page: Page, demonstrations: Sequence["Demonstration"], groups: Sequence[str], *, crop: bool) -> None:
@@ -117,7 +148,7 @@ def _draw_groups(page: Page, demonstrations: Sequence["Demonstration"], groups: 
 
 
 def _draw_rewards(
-    page: Page, demonstrations: Sequence["Demonstration"], rewards: Sequence[Path], trial: str | None, *, crop: bool
+    page: Page, one: "Demonstration", files: Sequence[Path], rewards: Sequence["Reward"], *, crop: bool
 ) -> None:
     """A row of policy and state reward for each reward; equal colours are equal values."""
     import numpy as np
@@ -127,11 +158,10 @@ def _draw_rewards(
     from navirl_cli.irl.scene import scenes_of
     from navirl_cli.irl.solved import solved
 
-    one = trial_of(demonstrations, trial)
-    scene, rows, stems = scenes_of([one])[0], [], [path.stem for path in rewards]
-    for path in rewards:
+    scene, rows, stems = scenes_of([one])[0], [], [path.stem for path in files]
+    for path, reward in zip(files, rewards, strict=True):
         name = path.stem if stems.count(path.stem) == 1 else str(path)
-        rows.append((name, solved(read_reward_for(path, demonstrations).reward, scene)))
+        rows.append((name, solved(reward, scene)))
     most = np.max([solution.visits for _, solution in rows], axis=0)
     window = likely_window(scene, most) if crop else scene_window(scene, most >= LEAST_VISITS)
     page.draw(

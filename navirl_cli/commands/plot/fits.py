@@ -6,9 +6,10 @@ from pathlib import Path
 import click
 
 from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.commands import completion
 from navirl_cli.commands.plot.page import Page, page_options
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example
+from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.errors import ArtefactError
 
 
@@ -16,24 +17,34 @@ from navirl_cli.errors import ArtefactError
     cls=Command,
     examples=[
         Example("All profiles of a fit", "navirl plot profile reward.json -o profile.pdf"),
-        Example("For slides", "navirl plot profile reward.json --style screen -o profile.png"),
+        Example("One of them", "navirl plot profile reward.json --parameter sigma_p -o profile.png"),
     ],
 )
 @page_options
 @click.argument("reward", type=FilePath)
-def profile(page: Page, reward: Path) -> None:
+@section(
+    "Chosen",
+    click.option(
+        "--parameter",
+        "parameters",
+        multiple=True,
+        shell_complete=completion.parameters,
+        help="Parameter whose profile to draw; repeatable; all by default.",
+    ),
+)
+def profile(page: Page, reward: Path, parameters: tuple[str, ...]) -> None:
     """Draw profile likelihoods of a fit.
 
     They show how well the data identify a parameter. The reward file holds them after navirl fit --profile.
     """
-    from navirl_cli.figures.profile import draw_profiles
+    from navirl_cli.figures.profile import chosen_profiles, draw_profiles
 
     learnt = read_reward(reward)
     if not learnt.profiles:
         raise ArtefactError(f"{reward}: expected profile likelihoods, found none; fit again with --profile sigma_p")
     units = {parameter.name: parameter.unit for parameter in learnt.reward.parameters}
     with page.look():
-        figure = draw_profiles(learnt.profiles, units, page.width_in)
+        figure = draw_profiles(chosen_profiles(learnt.profiles, parameters), units, page.width_in)
     page.save(figure, trim=False)
 
 

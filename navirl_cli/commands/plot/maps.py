@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.artefacts.rewards import read_reward_for
-from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, trial_of, trial_option
-from navirl_cli.commands.shared import demonstrations_in, demos_argument, seed_option
+from navirl_cli.commands.choosing import Choosing, choice_options
+from navirl_cli.commands.plot.page import Page, crop_option, page_options, reward_option, scene_of, trial_option
+from navirl_cli.commands.shared import demonstrations_in, demos_argument, person_option, say, seed_option
 from navirl_cli.commands.types import Choice, Count
-from navirl_cli.commands.usage import Command, Example, Function, section
+from navirl_cli.commands.usage import Command, Example, Function, refuse_unused, section
 
 if TYPE_CHECKING:
     from navirl_cli.arrays import FloatArray
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from navirl_cli.irl.values import Policy
 
 #: Values of --overlay.
-DEMOS, SAMPLES = "demos", "samples"
+DEMOS, ALL, SAMPLES = "demos", "all", "samples"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,35 +78,52 @@ class Sight:
         """Paths to draw over the map, driven ones below."""
         import numpy as np
 
-        from navirl_cli.figures.overlay import alike, overlays_of
+        from navirl_cli.figures.overlay import driven, overlays_of
         from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 
         sampled_m: list[FloatArray] = []
         if SAMPLES in self.overlay:
             paths = sample_paths(self.policy, self.scene.start, self.samples, np.random.default_rng(self.seed))
             sampled_m = sampled_lines_m(self.policy, paths)
-        return overlays_of(alike(self.demonstrations, self.one) if DEMOS in self.overlay else (), sampled_m)
+        shown: Sequence[Demonstration] = ()
+        if {DEMOS, ALL} & {*self.overlay}:
+            shown, note = driven(self.demonstrations, self.one, everywhere=ALL in self.overlay)
+            if note:
+                say(note)
+        return overlays_of(shown, sampled_m)
 
 
 def scene_options(function: Function) -> Function:
     """Options of figures of one scene, as arguments ``page`` and ``sight``."""
 
     @wraps(function)
-    def packed(page: Page, demos: Path, reward: Path, trial: str | None, **others: Any) -> Any:
-        demonstrations = demonstrations_in(demos)
-        learnt = read_reward_for(reward, demonstrations).reward
-        return function(page, Sight(demonstrations, trial_of(demonstrations, trial), learnt, **others))
+    def packed(
+        page: Page,
+        demos: Path,
+        reward: Path,
+        choosing: Choosing,
+        person: str | None,
+        trial: str | None,
+        **others: Any,
+    ) -> Any:
+        refuse_unused("--overlay samples", "samples", "seed", used=SAMPLES in others["overlay"])
+        everyone = demonstrations_in(demos)
+        learnt = read_reward_for(reward, everyone, person)
+        one, demonstrations = scene_of(choosing, everyone, [learnt], trial)
+        return function(page, Sight(demonstrations, one, learnt.reward, **others))
 
     scene = section(
         "Scene",
         reward_option,
+        person_option,
         trial_option,
         crop_option,
         click.option(
             "--overlay",
             multiple=True,
-            type=Choice((DEMOS, SAMPLES)),
-            help="Draw paths over the map: demonstrated in this scene, or sampled from the policy; repeatable.",
+            type=Choice((DEMOS, ALL, SAMPLES)),
+            help="Draw paths over the map: demonstrated in this scene by this participant (demos), all chosen ones on "
+            "this map (all), or sampled from the policy; repeatable.",
         ),
         click.option(
             "--samples",
@@ -116,7 +134,8 @@ def scene_options(function: Function) -> Function:
         ),
         seed_option,
     )
-    return page_options(demos_argument(scene(packed)))  # type: ignore[return-value]
+    chosen = choice_options(reward=True, trial=False)
+    return page_options(demos_argument(chosen(scene(packed))))  # type: ignore[return-value]
 
 
 @click.command(

@@ -10,16 +10,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.commands import completion
+from navirl_cli.commands.choosing import Choosing
 from navirl_cli.commands.shared import check_output, force_option, output_option, say
 from navirl_cli.commands.types import Choice, FilePath
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.errors import DemonstrationError, unknown
 
 if TYPE_CHECKING:
+    from navirl_cli.artefacts.rewards import LearntReward
     from navirl_cli.demos.demonstration import Demonstration
 
 #: Keys of :data:`navirl_cli.figures.style.LOOKS`, which is imported only to draw a figure.
 STYLES = ("paper", "screen", "dark")
+#: Keys of :data:`navirl_cli.figures.style.FONTS`.
+FONTS = ("sans", "times")
 #: Extensions of files; keys of :data:`navirl_cli.figures.sheet.METADATA`.
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -32,6 +36,7 @@ class Page:
     wide: bool
     style: str
     force: bool
+    font: str = "sans"
 
     @property
     def width_in(self) -> float:
@@ -45,7 +50,7 @@ class Page:
         """Draw in the chosen style."""
         from navirl_cli.figures.style import styled
 
-        with styled(self.style):
+        with styled(self.style, self.font):
             yield
 
     def save(self, figure: Any, *, trim: bool = True) -> None:
@@ -79,10 +84,10 @@ def page_options(function: Function) -> Function:
     """Options of every figure, as argument ``page``; a file that cannot be written is refused early."""
 
     @wraps(function)
-    def packed(output: Path, wide: bool, style: str, force: bool, **others: Any) -> Any:
+    def packed(output: Path, wide: bool, style: str, font: str, force: bool, **others: Any) -> Any:
         given = (path for value in others.values() for path in (value if isinstance(value, tuple) else (value,)))
         check_output(output, [path for path in given if isinstance(path, Path)], force=force)
-        return function(page=Page(output, wide, style, force), **others)
+        return function(page=Page(output, wide, style, force, font), **others)
 
     figure_options = section(
         "Output",
@@ -97,6 +102,13 @@ def page_options(function: Function) -> Function:
             show_default=True,
             help="paper: 300 dpi; screen: 600 dpi; dark: light ink on near-black, 600 dpi.",
         ),
+        click.option(
+            "--font",
+            type=Choice(FONTS),
+            default="sans",
+            show_default=True,
+            help="Letters; times: like those of an IEEE paper.",
+        ),
         force_option,
     )
     return figure_options(packed)  # type: ignore[return-value]
@@ -104,7 +116,7 @@ def page_options(function: Function) -> Function:
 
 crop_option = click.option("--crop", is_flag=True, help="Show only the surroundings of the paths.")
 trial_option = click.option(
-    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first]"
+    "--trial", shell_complete=completion.trials, help="Trial to draw, e.g. p01/3.  [default: the first chosen]"
 )
 reward_option = click.option("--reward", type=FilePath, required=True, help="Learnt reward.")
 
@@ -119,3 +131,20 @@ def trial_of(demonstrations: Sequence["Demonstration"], trial: str | None) -> "D
         if trial in {None, one.id}:
             return one
     raise DemonstrationError(unknown("`trial`", trial, [one.id for one in demonstrations]))
+
+
+def scene_of(
+    choosing: Choosing,
+    demonstrations: Sequence["Demonstration"],
+    rewards: Sequence["LearntReward"],
+    trial: str | None,
+) -> tuple["Demonstration", list["Demonstration"]]:
+    """The trial whose scene is drawn, and the chosen demonstrations; by default the first of these.
+
+    Raises:
+        NavirlError: A name is unknown.
+    """
+    if trial is None:
+        return choosing.scene_of(demonstrations, rewards)
+    one = trial_of(choosing.subset.of(demonstrations), trial)
+    return one, choosing.of(demonstrations, rewards, quiet=True)

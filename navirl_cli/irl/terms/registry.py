@@ -15,6 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from navirl_cli.errors import ArgumentError, RewardError, unknown
+from navirl_cli.files import read_regular
 from navirl_cli.irl.terms import TERMS
 from navirl_cli.irl.terms.term import Parameter, Term
 
@@ -100,7 +101,7 @@ def _from_file(word: str) -> Term:
 def _module(path: Path, word: str) -> ModuleType:
     """Run a Python file, once for each content."""
     try:
-        content = path.read_bytes()
+        content = read_regular(path)
     except OSError as error:
         raise RewardError(
             f"{word}: expected a Python file and a class as my_term.py:MyTerm: {error.strerror}"

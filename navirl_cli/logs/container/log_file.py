@@ -96,7 +96,6 @@ class LogFile:
             self._raw,
             self._damage,
             self._definitions,
-            sure=bool(footer and footer.summary_crc),
             counted=summary.statistics is not None,
             trust_indexes=trust_indexes,
             checked=self._survey.checked,

@@ -100,7 +100,8 @@ def walk_over_gaps(data: bytes | memoryview, channels: AbstractSet[int]) -> tupl
         more = records.walk(data, size, again)
         for channel, offsets in more.messages.items():
             found.messages.setdefault(channel, array("q")).extend(offsets)
-        found = FoundRecords(found.messages, [*found.definitions, *more.definitions], more.stop)
+        found.definitions.extend(more.definitions)
+        found = FoundRecords(found.messages, found.definitions, more.stop)
     return found, gaps
 
 

@@ -4,6 +4,7 @@ import stat
 from pathlib import Path
 
 from navirl_cli.errors import LogError
+from navirl_cli.files import not_regular
 from navirl_cli.logs.container.records import MAGIC
 
 #: The command that converts another bag to MCAP.
@@ -37,8 +38,8 @@ def check_path(path: Path) -> None:
         found = sorted(item.name for item in path.glob("*.mcap"))
         listing = f"it holds {', '.join(found)}" if found else "it holds no .mcap file"
         raise LogError(f"{path}: expected an MCAP file, found a folder ({listing}); give the .mcap files in it")
-    if not stat.S_ISREG(mode):
-        raise LogError(f"{path}: expected an MCAP file, found a pipe or a device; save its bytes to a file first")
+    if reason := not_regular(mode):
+        raise LogError(f"{path}: expected an MCAP file, found {reason}")
 
 
 def check_magic(path: Path, head: bytes, size: int, inside: str = "") -> None:

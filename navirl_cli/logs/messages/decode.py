@@ -103,7 +103,8 @@ class Decoder:
             new = derive(schema, batch.payload(int(rows[0])), self.paths)
             if new is None:
                 builder.put_payloads(batch, rows[:1].tolist())
-                rows = rows[1:]
+                # many of the same must not take long because they are wrong
+                rows = rows[1:] if builder.good[rows[0]] else builder.without_equal(batch, rows, size)
             else:
                 if len(known) < _MAX_REMEMBERED:
                     known.append(new)
@@ -159,6 +160,14 @@ class _ColumnBuilder:
                 self._columns[path][rows] = values
             elif values.size:
                 self._entries[path].append((rows, values))
+        return others
+
+    def without_equal(self, batch: Batch, rows: IntArray, size: int) -> IntArray:
+        """Rows of one size of which the first does not decode, without those that are equal to it."""
+        payloads = gathered(batch.raw, batch.starts[rows], np.dtype([("all", f"V{size}")] if size else []))
+        equal = payloads["all"] == payloads["all"][0] if size else np.ones(len(rows), dtype=np.bool_)
+        self.good[rows[equal]] = False
+        others: IntArray = rows[~equal]
         return others
 
     def put_payloads(self, batch: Batch, rows: "list[int] | range") -> None:

@@ -1,0 +1,120 @@
+"""The restricted likelihood of mean and scatter (Patterson and Thompson 1971, Biometrika 58:545).
+
+It takes into account that the mean is estimated too: the plain likelihood finds people too much alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navirl_cli.arrays import FloatArray
+from navirl_cli.irl.newton import Point, maximise
+from navirl_cli.irl.spread import Factors, Spread
+
+#: A scatter (standard deviation of a logarithm) is weakly held by half a normal distribution of this width: that most
+#: people differ by more than a factor of three in a parameter is not expected.
+WIDTH = 0.5
+#: Bounds of a scatter. At the lower one it counts as zero.
+LEAST, MOST = 0.01, 3.0
+#: Difference of logarithms for a derivative.
+DELTA = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Restricted:
+    """The restricted log-likelihood of mean and log scatters, with the weak prior of the scatters."""
+
+    factors: Factors
+    width: float = WIDTH
+    #: As a density of the logarithms of the scatters, or of the scatters.
+    jacobian: bool = True
+
+    def value(self, spread: Spread) -> float:
+        """The value alone."""
+        _, _, logs = self.factors.moments(spread)
+        lost = 0.5 * float(np.linalg.slogdet(self.information_of_mean(spread))[1])
+        return float(logs.sum()) - lost + self._prior(spread)
+
+    def _prior(self, spread: Spread) -> float:
+        """Log density of the scatters, up to a constant."""
+        held = -0.5 * float(((spread.scatter / self.width) ** 2).sum())
+        return held + (float(np.log(spread.scatter).sum()) if self.jacobian else 0.0)
+
+    def information_of_mean(self, spread: Spread) -> FloatArray:
+        """(v, v) observed information of the mean at given scatters."""
+        _, covariance, _ = self.factors.moments(spread)
+        precision = 1.0 / spread.scatter**2
+        found: FloatArray = len(covariance) * np.diag(precision) - np.outer(precision, precision) * covariance.sum(
+            axis=0
+        )
+        return found
+
+    def __call__(self, x: FloatArray) -> Point:
+        """Value, gradient and Hessian at (2v,) mean and log scatter."""
+        spread = Spread.at(x)
+        value, gradient, hessian = self._marginal(spread)
+        v = len(spread.mean)
+        lost, slope = self._lost(x)
+        bend = np.zeros_like(hessian)
+        for j in range(v, 2 * v):
+            step = np.zeros(2 * v)
+            step[j] = DELTA
+            bend[v:, j] = (self._lost(x + step)[1] - self._lost(x - step)[1])[v:] / (2 * DELTA)
+        squared = (spread.scatter / self.width) ** 2
+        gradient[v:] += self.jacobian - squared
+        hessian[v:, v:] -= np.diag(2 * squared)
+        return Point(
+            x,
+            value - lost + self._prior(spread),
+            gradient - slope,
+            hessian - 0.5 * (bend + bend.T),
+        )
+
+    def _marginal(self, spread: Spread) -> tuple[float, FloatArray, FloatArray]:
+        """The marginal log-likelihood with its derivatives, by the identities of Fisher and Louis (1982)."""
+        mean, covariance, logs = self.factors.moments(spread)
+        p = 1.0 / spread.scatter**2
+        away, spreads = mean - spread.mean, np.einsum("njj->nj", covariance)
+        scaled = covariance * np.outer(p, p)
+        squares = (away**2 + spreads) * p
+        gradient = np.concatenate([(away * p).sum(axis=0), (squares - 1).sum(axis=0)])
+        first = scaled.sum(axis=0) - np.diag(len(mean) * p)
+        mixed = 2 * np.einsum("njk,nk->jk", scaled, away) - np.diag(2 * (away * p).sum(axis=0))
+        last = np.einsum("njk->jk", 2 * covariance * scaled + 4 * scaled * away[:, :, None] * away[:, None, :])
+        last = last - np.diag(2 * squares.sum(axis=0))
+        return float(logs.sum()), gradient, np.block([[first, mixed], [mixed.T, last]])
+
+    def _lost(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Half the log determinant of the mean's information, and its (2v,) gradient."""
+        spread = Spread.at(x)
+        v = len(spread.mean)
+        information = self.information_of_mean(spread)
+        _, covariance, _ = self.factors.moments(spread)
+        gained = np.einsum("nij,njk->nik", covariance, self.factors.a)  # minus what the mean leaves of a shift of it
+        variance = np.linalg.inv(information)
+        freed = np.einsum("nij,jk,nik->i", gained, variance, gained) / spread.scatter**2
+        return 0.5 * float(np.linalg.slogdet(information)[1]), np.concatenate([np.zeros(v), -freed])
+
+
+def best_spread(
+    objective: Restricted, start: Spread, fixed: int | None = None, reach: tuple[float, float] | None = None
+) -> Point:
+    """The maximum of the restricted likelihood.
+
+    Args:
+        objective: The restricted likelihood.
+        start: Where the search starts.
+        fixed: A variable that is held, by number.
+        reach: How far the mean may move, in scatters, and the logarithm of a scatter; anywhere by default.
+    """
+    free = np.ones(len(start.x), dtype=bool)
+    if fixed is not None:
+        free[fixed] = False
+    v = len(start.mean)
+    wide = np.full(2 * v, np.inf)
+    if reach is not None:
+        wide = np.concatenate([reach[0] * start.scatter, np.full(v, reach[1])])
+    ends = np.full(v, np.inf)
+    low = np.maximum(start.x - wide, np.concatenate([-ends, np.full(v, np.log(LEAST))]))
+    high = np.minimum(start.x + wide, np.concatenate([ends, np.full(v, np.log(MOST))]))
+    return maximise(objective, objective(start.x), (low, high), free).best

@@ -1,0 +1,1 @@
+"""A folder of recordings that grows, and what is learnt from it so far."""

@@ -1,0 +1,137 @@
+"""Random effects: against a grid without approximation, closed forms, and finite differences."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import oracles
+import pytest
+
+from navirl_cli.arrays import FloatArray
+from navirl_cli.irl.newton import Point
+from navirl_cli.irl.nodes import draw, laplace, scattered
+from navirl_cli.irl.random_effects import random_effects
+from navirl_cli.irl.restricted import LEAST, WIDTH, Restricted
+from navirl_cli.irl.spread import Factors, Spread
+from navirl_cli.parallel import Local
+
+
+@dataclass
+class Bell:
+    """A Gaussian likelihood."""
+
+    at: FloatArray
+    precision: FloatArray
+
+    @property
+    def bounds(self):
+        return np.full(len(self.at), -np.inf), np.full(len(self.at), np.inf)
+
+    def __call__(self, y):
+        away = y - self.at
+        return Point(y, -0.5 * away @ self.precision @ away, -self.precision @ away, -self.precision)
+
+    def value(self, y):
+        return self(y).value
+
+
+@dataclass
+class Lopsided:
+    """The likelihood of a magnitude exp(y) seen through counts: steep above, flat below."""
+
+    at: float
+    information: float
+    bounds = (np.array([-np.inf]), np.array([np.inf]))
+
+    def __call__(self, y):
+        grown = np.exp(y - self.at)
+        value = self.information * (y - self.at - grown).sum()
+        return Point(y, float(value), self.information * (1 - grown), -self.information * np.diag(grown))
+
+    def value(self, y):
+        return self(y).value
+
+
+def bells(count=12, seed=0, scatter=(0.3, 0.2)):
+    rng = np.random.default_rng(seed)
+    precision = np.diag([50.0, 80.0])
+    return [
+        Bell(np.array([1.0, 2.0]) + rng.normal(0, scatter) + rng.normal(0, [0.14, 0.11]), precision)
+        for _ in range(count)
+    ]
+
+
+def test_lopsided_people_are_those_of_a_grid():
+    rng = np.random.default_rng(3)
+    people = [Lopsided(float(rng.normal(1.0, 0.5)), float(rng.uniform(4, 12))) for _ in range(10)]
+    found = random_effects(people, np.array([1.0]), executor=Local(1))
+    places = np.linspace(-3, 4, 500)
+    logs = np.array([[one.value(np.array([y])) for y in places] for one in people])
+    twin = oracles.scattered_people(
+        logs, places, np.linspace(-0.5, 2.5, 60), np.exp(np.linspace(np.log(LEAST), np.log(3), 60)), WIDTH
+    )
+    assert found.converged
+    mean, covariance = found.mixture.typical()
+    spread = twin["mean"][1]
+    assert mean[0] == pytest.approx(twin["mean"][0], abs=0.1 * spread)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(spread, rel=0.1)
+    assert found.mixture.scatter_quantile(0, 0.5) == pytest.approx(twin["scatter"][0], rel=0.1)
+    expected, deviation = twin["people"].T
+    assert np.abs((found.mixture.person_mean[:, 0] - expected) / deviation).max() < 0.15
+    assert np.sqrt(found.mixture.person_covariance[:, 0, 0]) == pytest.approx(deviation, rel=0.15)
+
+
+def test_a_posterior_under_a_spread_is_that_of_a_grid():
+    person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
+    known = draw(person, laplace(person, spread, spread.mean), spread).under(spread)
+    places = np.linspace(-4, 5, 20_001)
+    logs = np.array([person.value(np.array([y])) for y in places]) + spread.log_density(places[:, None])
+    weight = np.exp(logs)
+    mean = weight @ places / weight.sum()
+    variance = weight @ (places - mean) ** 2 / weight.sum()
+    assert known.mean[0] == pytest.approx(mean, abs=0.03 * np.sqrt(variance))
+    assert known.covariance[0, 0] == pytest.approx(variance, rel=0.05)
+    assert known.evidence == pytest.approx(np.log(weight.sum() * (places[1] - places[0])), abs=2e-3)
+    assert 0.5 * known.drawn < known.effective <= known.drawn
+
+
+def test_gaussian_people_with_much_information_scatter_as_they_do():
+    people = [Bell(one.at, one.precision * 1e4) for one in bells()]
+    found = random_effects(people, np.zeros(2), width=1e6, executor=Local(1))
+    at = np.array([one.at for one in people])
+    mean, _ = found.mixture.typical()
+    assert mean == pytest.approx(at.mean(axis=0), abs=1e-3)
+    # The mode of the density of the logarithm of a restricted scatter is the usual standard deviation, but for its 1.
+    assert found.spread.scatter == pytest.approx(at.std(axis=0, ddof=1) * np.sqrt(11 / 10), rel=0.01)
+    assert found.mixture.differ.all()
+    assert found.mixture.person_mean == pytest.approx(at, abs=1e-3)
+
+
+def test_people_who_are_alike_are_not_said_to_differ():
+    alike = [Bell(one.at, one.precision) for one in bells(scatter=(0.0, 0.0), seed=5)]
+    found = random_effects(alike, np.zeros(2), executor=Local(1))
+    assert not found.mixture.differ.any()
+    at = np.array([one.at for one in alike])
+    mean, _ = found.mixture.typical()
+    away = np.abs(found.mixture.person_mean - mean)
+    assert (away < np.abs(at - mean) + 1e-3).all(), "drawn towards the typical person"
+
+
+def test_derivatives_of_the_restricted_likelihood():
+    people, rng = bells(5), np.random.default_rng(1)
+    spread = Spread(np.array([1.1, 1.9]), np.array([0.3, 0.25]))
+    objective = Restricted(Factors.of([laplace(one, spread, spread.mean) for one in people], spread))
+    x = spread.x + rng.normal(0, 0.2, 4)
+    point = objective(x)
+    assert point.gradient == pytest.approx(oracles.derivative(lambda z: objective(z).value, x), abs=1e-6)
+    assert point.hessian == pytest.approx(oracles.derivative(lambda z: objective(z).gradient, x), abs=1e-4)
+
+
+def test_nodes_are_even_and_their_density_is_right():
+    person = Bell(np.array([0.5, -0.2]), np.array([[8.0, 3.0], [3.0, 6.0]]))
+    spread = Spread(np.zeros(2), np.ones(2))
+    y, density = scattered(laplace(person, spread, spread.mean), 4000, 0)
+    logs = np.array([person.value(one) for one in y]) + spread.log_density(y) - density
+    both = person.precision + np.eye(2)
+    pull = person.precision @ person.at
+    exact = 0.5 * pull @ np.linalg.solve(both, pull) - 0.5 * np.linalg.slogdet(both)[1] - 0.5 * pull @ person.at
+    assert np.log(np.exp(logs).mean()) == pytest.approx(exact, abs=2e-3)
