@@ -2,4 +2,5 @@
 
 from navirl_cli.cli import main
 
-main()
+if __name__ == "__main__":  # processes that do not fork import it again
+    main()

@@ -14,6 +14,7 @@ from stat import S_ISBLK, S_ISCHR, S_ISDIR, S_ISFIFO, S_ISREG, S_ISSOCK
 from typing import BinaryIO, Final
 
 from navirl_cli.errors import ArtefactError
+from navirl_cli.remote import Remote
 
 #: The file that lists a folder of demonstrations files.
 MANIFEST = "manifest.json"
@@ -81,11 +82,16 @@ class Input:
 
     @staticmethod
     def of(path: Path) -> "Input":
-        """Name and hash of a file; of a folder those of its manifest, which names and hashes the others.
+        """Name and hash of a file.
+
+        Of an object in a store the hash is that of what was read of it, of a folder that of its manifest, which names
+        the hashes of the others.
 
         Raises:
             ArtefactError: It cannot be read.
         """
+        if isinstance(path, Remote):
+            return Input(path.name, path.fetched.sha256)
         digest, name = sha256(), path.name
         if path.is_dir() and (path / MANIFEST).exists():
             path, name = path / MANIFEST, f"{path.resolve().name}/{MANIFEST}"

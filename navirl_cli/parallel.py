@@ -7,6 +7,7 @@ order in which items are done.
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -21,6 +22,8 @@ from navirl_cli.errors import WorkerLostError
 
 #: A worker whose parent is gone has this long to clean up, s.
 _GRACE_S: Final = 2.0
+#: Signals after which a command cleans up.
+_DELAYED: Final = {getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)}
 #: Items that are handed to an executor of unknown size before the first of them is done.
 _AHEAD: Final = 1000
 
@@ -106,7 +109,8 @@ class Local(Executor):
         from concurrent.futures import ProcessPoolExecutor  # which imports multiprocessing
 
         share = max(1, cores() // workers)
-        with ProcessPoolExecutor(workers, initializer=_Worker.listen, initargs=(function, share)) as pool:
+        context, begin = _context(), (function, share)
+        with ProcessPoolExecutor(workers, context, initializer=_Worker.listen, initargs=begin) as pool:
 
             def submit(item: Item) -> "Future[Result]":
                 with _no_interrupt():  # Python loses an interrupt that comes while a process forks
@@ -235,13 +239,25 @@ def _begun(submit: Submit[Item, Result], item: Item) -> "Future[Result]":
         return future
 
 
+def _context() -> Any:
+    """How processes start: as Python likes, but not as a copy of this process where its threads would be missed."""
+    from multiprocessing import get_all_start_methods, get_context
+
+    if "obstore" not in sys.modules:
+        return get_context()
+    return get_context("forkserver" if "forkserver" in get_all_start_methods() else "spawn")
+
+
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Delay interrupts until the block ends. Processes that begin in it delay them until they handle them."""
+    """Delay interrupts and terminations until the block ends: half started, a pool would never end.
+
+    Processes that begin in the block delay them until they handle them.
+    """
     if not hasattr(signal, "pthread_sigmask"):  # as on Windows, which does not fork either
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _DELAYED)
     try:
         yield
     finally:
@@ -268,7 +284,7 @@ class _Worker:
         signal.signal(signal.SIGINT, cls._interrupted)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _DELAYED)
 
     @classmethod
     def run(cls, item: Any) -> Any:

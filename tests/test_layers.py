@@ -12,6 +12,7 @@ PACKAGE = Path(navirl_cli.__file__).parent
 ORDERS = {
     "navirl_cli": [
         ["__init__", "arrays", "errors", "limits"],
+        ["remote"],
         ["files", "parallel"],
         ["documents", "cluster"],
         ["logs"],
@@ -40,6 +41,7 @@ ORDERS = {
     "navirl_cli.logs.container": [
         ["__init__", "damage", "records"],
         ["batches", "raw", "sniff"],
+        ["remote_file"],
         ["chunks", "compressed", "summary"],
         ["resync", "insertion"],
         # what the pieces define reaches the survey through `batches.Definitions`, which both are given

@@ -25,6 +25,7 @@ from navirl_cli.files import MANIFEST, Input, new_folder, replacing
 from navirl_cli.logs.load import LoadOptions
 from navirl_cli.logs.sources import Source
 from navirl_cli.parallel import as_completed
+from navirl_cli.remote import Remote
 
 #: The manifest is written again when this many times the duration of the last writing have passed, and this time, s.
 _TIMES: Final = 20
@@ -147,6 +148,8 @@ class Folder:
         if stated != [(one.address, one.size_bytes) for one in parts]:
             return False
         if [one.etag for one in known.files] != [one.etag for one in parts]:
+            if any(isinstance(file, Remote) for file in source.files):
+                return False
             if [one.sha256 for one in known.files] != [Input.of(file).sha256 for file in source.files]:
                 return False
             files = tuple(replace(one, etag=new.etag) for one, new in zip(known.files, parts, strict=True))
@@ -247,9 +250,12 @@ def _parts(source: Source) -> tuple[Part, ...]:
     """The files of a recording, without reading them."""
     found = []
     for file in source.files:
-        status = file.stat()
-        etag = f"{status.st_ino:x}-{status.st_size:x}-{status.st_mtime_ns:x}"
-        found.append(Part(str(file.absolute()), status.st_size, etag, None))
+        if isinstance(file, Remote):
+            size, etag = file.fetched.size, file.fetched.etag
+        else:
+            status = file.stat()
+            size, etag = status.st_size, f"{status.st_ino:x}-{status.st_size:x}-{status.st_mtime_ns:x}"
+        found.append(Part(str(file.absolute()), size, etag, None))
     return tuple(found)
 
 

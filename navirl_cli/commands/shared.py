@@ -13,13 +13,14 @@ import click
 
 from navirl_cli.artefacts.demonstrations import read_demonstrations
 from navirl_cli.commands import completion
-from navirl_cli.commands.types import Choice, Count, FilePath, OutputPath, Point, RoleTopic
+from navirl_cli.commands.types import Choice, Count, FilePath, LogPath, OutputPath, Point, RoleTopic
 from navirl_cli.commands.usage import Function, as_options, is_quiet, is_verbose, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.inline import printable
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.files import check_writable
+from navirl_cli.remote import Remote
 
 #: As :data:`navirl_cli.evaluation.drawn.MOST`, which is not imported before paths are sampled.
 MOST_SAMPLES = 100_000
@@ -46,7 +47,7 @@ person_name_option = click.option(
     shell_complete=completion.persons,
     help="Drive by this person's own reward, of a reward fitted with --pool persons.  [default: the typical person's]",
 )
-logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=FilePath)
+logs_argument = click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=LogPath())
 topic_option = click.option(
     "--topic",
     "topics",
@@ -136,6 +137,8 @@ def refuse_inputs(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
         UsageError: One is.
     """
     for path in inputs:
+        if isinstance(path, Remote):
+            continue
         own = [path, *_files_of(path)]
         for output in outputs:
             if same := next((one for one in own if _are_same(output, one)), None):

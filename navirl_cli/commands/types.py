@@ -11,9 +11,18 @@ from typing import Any
 import click
 
 from navirl_cli.errors import ArgumentError, unknown
+from navirl_cli.remote import Remote, path_of
 
 #: Whoever reads a file says why it cannot be read, and goes on with others.
 FilePath = click.Path(path_type=Path, readable=False)
+
+
+class LogPath(click.Path):
+    """A file, a folder, a pattern, or an address in a store."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Keep addresses as they are."""
+        return path_of(value) if isinstance(value, Remote) else path_of(fsdecode(super().convert(value, param, ctx)))
 
 
 @dataclass(frozen=True)

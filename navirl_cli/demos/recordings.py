@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from traceback import extract_tb
@@ -28,6 +28,7 @@ from navirl_cli.logs.messages.reader import Progress
 from navirl_cli.logs.roles.topics import HOLDS
 from navirl_cli.logs.sources import Source, sources_of
 from navirl_cli.parallel import as_completed
+from navirl_cli.remote import Remote, path_of
 
 #: The hashes of a recording's files, and its demonstrations.
 _Result = tuple[tuple[Input, ...], Extraction]
@@ -125,7 +126,7 @@ def sources_for(
     """The recordings among the arguments, and why others are none; arguments as in :func:`extract_recordings`."""
     refused: list[LogError] = []
     if isinstance(executor, Cluster):  # whose workers have another working directory
-        logs = [Path(log).absolute() for log in logs]
+        logs = [path_of(log).absolute() for log in logs]
     # where all are pieces of one recording none may be missing
     return sources_of(logs, join=join, refused=None if join else refused), refused
 
@@ -140,6 +141,17 @@ def rows_of(
     radius, people = ("robot_radius", settings.robot_radius_m), ("person", settings.people_m)
     check_agreement(labels, {**stated, "robot_radius_m": radius, "people_m": people})
     return labels_by_source(labels, sources)
+
+
+def _fetched(source: Source) -> list[str]:
+    """What was read of the objects of a recording."""
+    remote = [path.fetched for path in source.files if isinstance(path, Remote)]
+    if not remote:
+        return []
+    done, size = sum(one.size_read for one in remote) / 1e6, sum(one.size for one in remote) / 1e6
+    return [
+        f"{source.name}: {done:.1f} of {size:.1f} MB were fetched in {sum(one.requests for one in remote)} requests"
+    ]
 
 
 def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
@@ -190,9 +202,13 @@ def extracted(
     source, labels = job
     try:
         with ThreadPoolExecutor(1) as pool:
-            hashes = pool.submit(lambda: tuple(Input.of(path) for path in source.files))
+            local = [path for path in source.files if not isinstance(path, Remote)]
+            hashes = pool.submit(lambda: {path: Input.of(path) for path in local})
             extraction = extract(load_recording(source, options, progress), settings, labels)
-            return hashes.result(), extraction
+            hashed = hashes.result()
+        # of an object in a store only what was read counts, which is known now
+        inputs = tuple(hashed[path] if path in hashed else Input.of(path) for path in source.files)
+        return inputs, replace(extraction, notes=(*extraction.notes, *_fetched(source)))
     except NavirlError as error:
         return error
     except Exception as error:

@@ -14,6 +14,7 @@ from navirl_cli.errors import LogError, brief
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.sniff import CONVERT, check_path
 from navirl_cli.logs.yaml_file import read_mapping
+from navirl_cli.remote import Remote, path_of
 
 #: What rosbag2 writes when a recording ends.
 METADATA: Final = "metadata.yaml"
@@ -84,13 +85,13 @@ def _attempted(
 
 def _of_argument(argument: Path | str, errors: list[LogError]) -> list[Source]:
     """The recordings of one argument."""
-    path, text = Path(argument), os.fspath(argument)
+    path, text = path_of(argument), os.fspath(argument)
     if _is_folder(path):
         found = _recordings(path, set(), errors)
         if not found and not errors:
             raise LogError(f"{path}: expected .mcap files in this folder or below it, found {_content(path)}")
         return found
-    if not _mode(path) and any(sign in text for sign in "*?["):
+    if not isinstance(path, Remote) and not _mode(path) and any(sign in text for sign in "*?["):
         return _of_pattern(text, errors)
     check_path(path)
     return [Source(path.name, (path,))]
@@ -286,7 +287,7 @@ def _with_hint(source: Source) -> Source:
     """A file given alone, with a note where it is a piece of a longer recording."""
     file = source.files[0]
     folder = file.absolute().parent
-    if source.name != file.name or not _pieces(folder.name, [file]):
+    if isinstance(file, Remote) or source.name != file.name or not _pieces(folder.name, [file]):
         return source
     pieces = _pieces(folder.name, folder.glob(f"{glob.escape(folder.name)}_*"))
     if len(pieces) < 2:

@@ -4,6 +4,7 @@ A compressed file is decompressed block by block (zstd: RFC 8878, 3.1.1; lz4: LZ
 file. All blocks before a cut or a damaged one are kept, and memory holds one block.
 """
 
+import io
 import os
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,7 +20,9 @@ from navirl_cli.files import open_regular
 from navirl_cli.limits import REMEDY, Allowance, in_mb
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.raw import RawFile
+from navirl_cli.logs.container.remote_file import RemoteFile, Stream
 from navirl_cli.logs.container.sniff import check_magic, check_path, check_start, decompressed_name
+from navirl_cli.remote import Remote
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 _LZ4: Final = b"\x04\x22\x4d\x18"
@@ -30,6 +33,7 @@ _MAX_WINDOW_BYTES: Final = 128 << 20
 _MAX_LZ4_BLOCK_BYTES: Final = 4 << 20
 #: Enough to identify a file.
 _HEAD_BYTES: Final = 512
+_BUFFER: Final = 1 << 20
 
 
 def open_log(path: Path) -> RawFile:
@@ -43,6 +47,8 @@ def open_log(path: Path) -> RawFile:
             free space for the decompressed file.
     """
     check_path(path)
+    if isinstance(path, Remote):
+        return _open_remote(path)
     with ExitStack() as on_failure:
         try:
             file = on_failure.enter_context(open_regular(path))
@@ -56,6 +62,24 @@ def open_log(path: Path) -> RawFile:
         check_magic(path, head, size)
         on_failure.pop_all()
     return RawFile(path, file, size)
+
+
+def _open_remote(path: Remote) -> RawFile:
+    """Open a log in a store; a compressed one is read as a whole."""
+    raw = RemoteFile(path)
+    with ExitStack() as on_failure:
+        on_failure.callback(raw.close)
+        head = raw.read(0, _HEAD_BYTES)
+        if compression := _compression(head):
+            return _decompressed(
+                path,
+                io.BufferedReader(Stream(raw), _BUFFER),  # type: ignore[type-var]
+                raw.size,
+                compression,
+            )
+        check_magic(path, head, raw.size)
+        on_failure.pop_all()
+    return raw
 
 
 def _compression(head: bytes) -> str:

@@ -29,6 +29,7 @@ from navirl_cli.logs.container.records import HEAD_SIZE
 from navirl_cli.logs.container.summary import Summary, read_footer, read_header, read_summary
 from navirl_cli.logs.container.survey import Survey
 from navirl_cli.parallel import cores
+from navirl_cli.remote import path_of
 
 #: More threads only wait for each other and for memory.
 _MAX_THREADS: Final = 4
@@ -63,7 +64,7 @@ class LogFile:
     """
 
     def __init__(self, path: Path | str | RawFile, *, trust_indexes: bool = True) -> None:
-        self._raw = path if isinstance(path, RawFile) else open_log(Path(path))
+        self._raw = path if isinstance(path, RawFile) else open_log(path if isinstance(path, Path) else path_of(path))
         self._keeps_open = self._raw is path
         self.path, self.size = self._raw.path, self._raw.size
         #: Bytes walked over so far.
@@ -97,6 +98,7 @@ class LogFile:
             self._definitions,
             counted=summary.statistics is not None,
             trust_indexes=trust_indexes,
+            checked=self._survey.checked,
         )
 
     def __enter__(self) -> Self:
@@ -109,7 +111,7 @@ class LogFile:
 
     def _close(self) -> None:
         if not self._keeps_open:
-            self._raw.file.close()
+            self._raw.close()
 
     @property
     def damage(self) -> list[Damage]:
@@ -156,6 +158,7 @@ class LogFile:
         # after a block of this size was freed, glibc keeps smaller ones and does not return them after each chunk
         np.empty(_KEPT_BYTES, dtype=np.uint8)
         jobs: deque[_Job[T]] = deque()
+        self._raw.plan([(one.start, one.stop) for one in self._survey.planned() if self._may_hold(one, wanted)])
         with ThreadPoolExecutor(threads) as pool:
             for piece in self._survey.pieces():
                 if piece is None:
@@ -165,12 +168,19 @@ class LogFile:
                 if channels == ():
                     self._opener.skip(piece)
                     continue
-                jobs.append(_Job(piece, pool.submit(self._opener.open, piece, channels, use)))
+                jobs.append(_Job(piece, pool.submit(self._opener.open, self._survey.checked(piece), channels, use)))
                 if len(jobs) > threads:
                     yield from self._results(jobs.popleft(), wanted, use)
             yield from self._all_results(jobs, wanted, use)
         self.position = self.size
         self._survey.check_data()
+
+    def _may_hold(self, piece: Piece, wanted: Wanted) -> bool:
+        """Whether a chunk may hold wanted messages, by what is known before it is read."""
+        known = [number for number in piece.indexes if number in self._definitions.channels]
+        return (
+            len(known) < len(piece.indexes) or not known or any(wanted(self._definitions.channel(one)) for one in known)
+        )
 
     def times(self) -> dict[int, IntArray]:
         """Times of receipt in ns of all messages by channel, ascending; from message indexes where possible."""
@@ -183,10 +193,11 @@ class LogFile:
 
     def _times(self) -> dict[int, IntArray]:
         found: dict[int, list[IntArray]] = {}
+        self._raw.plan([(one.start + one.length, one.stop) for one in self._survey.planned()])
         for piece in filter(None, self._survey.pieces()):
             times = self._opener.times(piece)
             if times is None:
-                opened, _ = self._opener.open(piece, None, lambda batch: batch)
+                opened, _ = self._opener.open(self._survey.checked(piece), None, lambda batch: batch)
                 for batch in self._opener.batches(piece, opened, lambda _: True):
                     found.setdefault(batch.channel.id, []).append(batch.log_time_ns)
             else:

@@ -30,6 +30,7 @@ class Opener:
         definitions: Schemas and channels of the summary; those that the pieces define are added.
         counted: Whether statistics count the messages of each channel: only they show what message indexes leave out.
         trust_indexes: False to ignore message indexes.
+        checked: Gives a piece the reason why it is not opened.
     """
 
     def __init__(
@@ -40,7 +41,9 @@ class Opener:
         *,
         counted: bool,
         trust_indexes: bool,
+        checked: Callable[[Piece], Piece],
     ) -> None:
+        self._checked = checked
         self._definitions = definitions
         #: Whether messages are found by message indexes, where a piece has them.
         self.by_index = counted and trust_indexes
@@ -181,7 +184,7 @@ class Opener:
         if not self._definitions.knows(number):
             skipped, self._skipped = self._skipped, []
             for piece in skipped:
-                opened, _ = self.open(piece, None, lambda batch: batch)
+                opened, _ = self.open(self._checked(piece), None, lambda batch: batch)
                 self._define(piece, opened, self._records(piece, opened)[0])
         return number in self._definitions.channels
 

@@ -2,6 +2,7 @@
 
 import os
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Final, Self
@@ -30,6 +31,8 @@ class RawFile:
         self.size = size
         self.damage = damage
         self._ahead = (0, b"")
+        #: Whether a few bytes anywhere cost next to nothing.
+        self.nearby = True
 
     def __enter__(self) -> Self:
         return self
@@ -37,7 +40,14 @@ class RawFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
         self.file.close()
+
+    def plan(self, ranges: Sequence[tuple[int, int]]) -> None:
+        """Name ranges [start, stop) that are going to be read; of no use where reading is cheap."""
 
     def read(self, start: int, stop: int) -> bytes:
         """Bytes [start, stop), fewer where the file ends."""

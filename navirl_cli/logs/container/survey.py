@@ -102,17 +102,25 @@ class Survey:
                 following = self._resume(at, broken)
             if piece is not None:
                 self._damage.met(piece.span_ns)
-                yield replace(piece, number=count, refusal=self._refusal(piece))
+                yield replace(piece, number=count)
                 count += 1
             at = following
         if at is not None:
             size = self._raw.size
             self._damage.add(size, size, "the file ends without its closing records; everything in it was read")
 
+    def checked(self, piece: Piece) -> Piece:
+        """A piece that is going to be opened, with the reason why it is not, if there is one."""
+        return replace(piece, refusal=self._refusal(piece))
+
+    def planned(self) -> list[Piece]:
+        """The chunks that the summary names, in the file's order."""
+        return [self._indexed(self._chunks[start]) for start in self._starts]
+
     def check_data(self) -> None:
-        """Check the CRC of the data section, if the walk found one."""
+        """Check the CRC of the data section, if the walk found one; of a remote file most bytes were never read."""
         expected, stop = self._data_crc or (0, 0)
-        if expected and (crc := self._raw.crc(stop)) != expected:
+        if expected and self._raw.nearby and (crc := self._raw.crc(stop)) != expected:
             self._damage.add(
                 0,
                 stop,
@@ -154,7 +162,7 @@ class Survey:
 
     def _lacks_head(self, index: ChunkIndex) -> bool:
         """Whether a chunk is not compressed and its header is damaged: its messages are found without the header."""
-        if index.compression:
+        if index.compression or not self._raw.nearby:
             return False
         try:
             head = self._chunk_head(index.start, self._raw.size)

@@ -16,6 +16,7 @@ from navirl_cli.logs.messages.decode import DecodedBatch
 from navirl_cli.logs.messages.packing import Packer
 from navirl_cli.logs.messages.schema import full_name
 from navirl_cli.logs.messages.series import Series, SeriesBuilder
+from navirl_cli.remote import path_of
 
 #: Called with the bytes done and the bytes of all files.
 Progress = Callable[[int, int], None]
@@ -160,7 +161,8 @@ def _size(path: Log) -> int:
     """Bytes of a file, for the progress; 0 if it is missing."""
     if isinstance(path, RawFile):
         return path.size
-    return Path(path).stat().st_size if Path(path).is_file() else 0
+    path = path_of(path)
+    return path.stat().st_size if path.is_file() else 0
 
 
 def _read_file(
