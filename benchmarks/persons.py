@@ -81,6 +81,8 @@ def main() -> int:
             rows += study(where)
         else:
             print(f"the published study's data are not available in {where}; set NAVIRL_STUDY_DIR", file=sys.stderr)
+            if options.part == "study":
+                return 2
     return report(rows, as_json=options.json)
 
 

@@ -24,6 +24,8 @@ BEGINNINGS = {
     ".pdf": b"%PDF",
 }
 SLOW = {
+    "fit demos.json --pool persons -o population.json",
+    "plan reward.json --scene demos.json:p01/3 --recommend",
     "report demos.json reward.json --samples 50 -o report.html --force",
     "simulate -o simulated",
     "models demos.json --condition force --cycle 2",

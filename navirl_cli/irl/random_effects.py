@@ -24,14 +24,15 @@ from navirl_cli.parallel import map_in_order
 #: Scatter at which the search starts.
 FIRST = 0.2
 #: Pairs of nodes of all people together, and the least number of a person.
-PAIRS, FEWEST_PAIRS = 600, 24
+PAIRS, FEWEST_PAIRS = 800, 48
 #: Largest numbers of rounds with modes, of draws of nodes, and of rounds with the same nodes.
 MODE_ROUNDS, DRAWS, NODE_ROUNDS = 8, 5, 12
 #: Largest move of a round: of the mean in scatters, of the logarithm of a scatter. Farther away the Gaussian stand-ins
 #: say nothing about the likelihoods.
 REACH = 1.0, 0.7
-#: A round moves the spread by less than so many standard errors at the end of the modes, and with the same nodes.
-SMALL, SMALLEST = 0.2, 0.02
+#: A round moves the spread by less than so many standard errors: at the end of the modes, with the same nodes, and with
+#: new ones, whose draw has an error of its own.
+SMALL, SMALLEST, AGREES = 0.2, 0.02, 0.3
 #: Nodes are drawn again where, for a person, fewer than this share of them count.
 WORN = 0.25
 
@@ -117,7 +118,7 @@ class _Search:
                 fresh = min(one.effective for one in self.posteriors) > WORN * 2 * pairs
                 if moved < SMALLEST or not fresh:
                     break
-            self.converged = fresh and max(first, moved) < SMALL
+            self.converged = fresh and max(first, moved) < AGREES
             around, self.around = (self.posteriors, under) if fresh else (self._laplace(), self.spread)
             if self.converged:
                 break

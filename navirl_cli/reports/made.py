@@ -15,7 +15,7 @@ _FIT = {"method": "newton", "l2": 1e-3, "learnt_from": "all", "terms": ["length"
 _OPTIONS = {"method": "--method", "l2": "--l2", "learnt_from": "--steps", "terms": "--terms"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Made:
     """The files of a report and how it was asked for."""
 
