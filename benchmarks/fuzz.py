@@ -24,7 +24,7 @@ from fuzzing import MOST_READ, Tally, judge_logs
 
 from navirl_cli.parallel import cores
 
-COUNT, QUICK, AT_ONCE = 100_000, 1000, 200
+COUNT, QUICK, AT_ONCE = 100_000, 1000, 50
 MOST_S, MOST_MB = 10.0, 500
 #: A process that hangs and handles no signal prints its stack and ends after this time, s.
 HANGS_S = 240.0
@@ -66,11 +66,9 @@ def judge_all(count: int, seed: int, keep: Path | None) -> Iterator[Tally]:
 
 
 def watched(numbers: range, seed: int, keep: Path | None) -> Tally:
-    """Judge logs one by one; a process that hangs ends."""
-    tally = Tally()
-    for number in numbers:
-        faulthandler.dump_traceback_later(HANGS_S, exit=True)
-        tally.add(judge_logs([number], seed, keep))
+    """Judge logs one after the other; a process that hangs ends."""
+    faulthandler.dump_traceback_later(HANGS_S, exit=True)
+    tally = judge_logs(numbers, seed, keep)
     faulthandler.cancel_dump_traceback_later()
     return tally
 

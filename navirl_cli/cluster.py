@@ -4,6 +4,7 @@ The function of a work is a task of its own: it goes to each worker once, stays 
 kept, and is made again when its worker is lost. Items and results are all that travels besides.
 """
 
+import logging
 import os
 import pickle
 import platform
@@ -151,6 +152,8 @@ def connected(address: str) -> Iterator[Executor]:
                 f"`cluster`: expected the address of a running scheduler, found {address!r}: {error}; "
                 "start one by `dask scheduler` and workers by `dask worker ADDRESS`"
             ) from error
+        # of tasks that are cancelled after an error or Ctrl-C, Dask logs that they cannot be set any more
+        logging.getLogger("tornado.application").setLevel(logging.CRITICAL)
         with client:
             check(versions(), client.run(versions, on_error="return"), address)
             yield Cluster(client)

@@ -259,5 +259,5 @@ def _refused(path: Remote, error: Exception) -> Exception:
         what = "the link may have expired" if "?" in path.address else "check the credentials in the environment"
         return LogError(f"{path}: expected the right to read it, found that the store refuses; {what}")
     code = re.search(r"\b[45][0-9]{2} [A-Z][A-Za-z ]{2,30}", text)
-    found = code[0].strip() if code else kind
+    found = code[0].strip() if code else "no usable answer"
     return LogError(f"{path}: expected the store to answer, found: {found} after several attempts; try again later")

@@ -13,10 +13,10 @@ from navirl_cli.errors import ArgumentError
 
 
 @contextmanager
-def scheduler(workers=2, **environment):
+def scheduler(workers=2, folders=(), **environment):
     """Yield the address of a scheduler and its worker processes, and end them after the block."""
     words = ["--no-dashboard", "--host", "127.0.0.1"]
-    path = os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    path = os.pathsep.join([str(Path(__file__).parent), *folders, *filter(None, [os.environ.get("PYTHONPATH")])])
     env = {**os.environ, "PYTHONPATH": path, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1", **environment}
     first = started("dask_scheduler", *words, "--port", "0", env=env, stderr=subprocess.PIPE, text=True)
     others = []

@@ -8,6 +8,7 @@ import numpy as np
 import oracles
 import pytest
 import shapely
+from executors import Here
 from path_values import line_values
 from scipy import stats
 
@@ -32,6 +33,7 @@ from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import scenes_of
+from navirl_cli.parallel import Local
 from navirl_cli.reports.evaluation import evaluation_text
 
 GRID = make.open_grid(40, 21)
@@ -132,7 +134,8 @@ def test_learnt_values_are_those_of_the_paths_one_by_one():
     learnt = of(run(reward=REWARD, samples=200), "force, cycle 2", LEARNT)
     scene = scenes_of(TRIALS[:1])[0]
     policy = policy_of(REWARD, scene)
-    paths = sample_paths(policy, scene.start, 200, np.random.default_rng(0))
+    (stream,) = np.random.default_rng(0).spawn(1)
+    paths = sample_paths(policy, scene.start, 200, stream)
     lines = sampled_lines_m(policy, paths)
     nominal = scene.nominal_line_m()
     values = [line_values(line, nominal, PERSON, 0.25) for line in lines]
@@ -286,6 +289,12 @@ def test_progress_counts_demonstrations():
     seen = []
     run(progress=lambda done, of_all: seen.append((done, of_all)))
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_processes_change_nothing():
+    here = run(reward=REWARD, samples=50)
+    assert run(reward=REWARD, samples=50, executor=Local(2)) == here
+    assert run(reward=REWARD, samples=50, executor=Here()) == here
 
 
 def test_intervals_of_means_count_participants_not_trials():

@@ -163,3 +163,13 @@ def test_a_demonstration_without_a_scene_is_named():
 def test_people_are_kept_as_points():
     scene = Scene.on(make.open_grid(3, 1), np.array([0, 0]), np.array([2, 0]), np.array([1.0, 2.0, 3.0, 4.0]))
     assert scene.people_m.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+
+
+def test_scenes_of_one_goal_share_the_order_of_the_states():
+    people = np.array([[0.3, 0.3]])
+    grid = make.open_grid(9, 7)
+    first = Scene.on(grid, np.array([1, 1]), np.array([6, 4]), people)
+    second = Scene.on(grid, np.array([2, 1]), np.array([6, 4]), people + 0.1, first.lattice)
+    other = Scene.on(grid, np.array([2, 1]), np.array([5, 4]), people, first.lattice)
+    assert second.ordering is first.ordering
+    assert other.ordering is not first.ordering

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -419,6 +419,9 @@ def evaluate(
     samples: int = 1000,
     precision: float | None = None,
     seed: int = 0,
+    workers: int | None = None,
+    cluster: str | None = None,
+    executor: Executor | None = None,
 ) -> Evaluation:
     """Measure demonstrated, learnt and baseline paths, as ``navirl evaluate``.
 
@@ -444,6 +447,10 @@ def evaluate(
         precision: Sample until the Monte Carlo error of each mean is below this share of the mean or of its standard
             deviation.
         seed: Seed of all random numbers.
+        workers: Number of processes that draw and measure paths of policies; by default this one. Use it under
+            ``if __name__ == "__main__":``.
+        cluster: Address of a running Dask scheduler that distributes them.
+        executor: Any other executor that does so.
 
     Returns:
         Metrics by group; print them, write them, or take :meth:`~navirl_cli.api.results.Evaluation.to_frame`.
@@ -472,7 +479,9 @@ def evaluate(
     asked = asked_of(files, subset, trained, everything=all, pairs=pairs, fields=fields, ranked=ranks)
     rng = np.random.default_rng(seed)
     learnt = {name: one if isinstance(one, Reward) else one.reward for name, one in rewards.items()}
-    found = answers_to(asked, learnt, measured, drawing, rng)
+    here = executor is None and workers is None and cluster is None
+    with nullcontext() if here else _executor(executor, workers, cluster) as where:
+        found = answers_to(asked, learnt, measured, drawing, rng, executor=where)
     inputs = [one for own in files.values() for one in sources_behind(own)]
     inputs += [file for one in rewards.values() for file in files_behind(one)]
     document = metrics_document(found.result, found.pairs, found.ranked, measured, inputs, drawing, seed, shares)

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from navirl_cli.artefacts.analyses import intervals_document
 from navirl_cli.artefacts.store import number, read_json
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
@@ -85,6 +86,7 @@ def _cycle(found: CycleFit | None) -> dict[str, Any]:
                 "theta",
                 "standard_errors",
                 "standard_errors_clustered",
+                "intervals",
                 "status",
                 "log_likelihood",
                 "steps",
@@ -92,7 +94,8 @@ def _cycle(found: CycleFit | None) -> dict[str, Any]:
                 "paths",
             )
         )
-    return {**_fit(found.fit), "paths": None if found.near is None else _closeness(found.near)}
+    intervals = [intervals_document(one) for one in found.intervals]
+    return {**_fit(found.fit), "intervals": intervals, "paths": None if found.near is None else _closeness(found.near)}
 
 
 def _fit(fit: Fit) -> dict[str, Any]:

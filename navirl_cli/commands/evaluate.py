@@ -9,6 +9,7 @@ import click
 
 from navirl_cli.artefacts.metrics import metrics_document
 from navirl_cli.artefacts.rewards import LearntReward, read_reward_for
+from navirl_cli.cluster import workers_of
 from navirl_cli.commands import completion
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
@@ -25,6 +26,7 @@ from navirl_cli.commands.shared import (
     samples_option,
     say,
     seed_option,
+    workers_options,
 )
 from navirl_cli.commands.types import Choice, FilePath, Number, OutputPath
 from navirl_cli.commands.usage import Command, Example, refuse_unused, section
@@ -176,6 +178,7 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
     json_option,
     force_option,
 )
+@workers_options
 def evaluate(
     demos: tuple[Path, ...],
     choosing: Choosing,
@@ -195,6 +198,8 @@ def evaluate(
     as_json: bool,
     output: Path | None,
     force: bool,
+    workers: int | None,
+    cluster: str | None,
 ) -> None:
     """Measure demonstrated, learnt and baseline paths, and compare groups of them.
 
@@ -230,7 +235,8 @@ def evaluate(
     for line in asked.notes:
         say(line)
     rng, precision = np.random.default_rng(seed), Precision(samples, error)
-    with progress_bar("evaluate", sum(map(len, asked.files.values()))) as update:
+    bar = progress_bar("evaluate", sum(map(len, asked.files.values())))
+    with workers_of(workers, cluster) as executor, bar as update:
         found = answers_to(
             asked,
             {name: one.reward for name, one in learnt.items()},
@@ -238,6 +244,7 @@ def evaluate(
             precision,
             rng,
             lambda done, _all: update(done, ""),
+            executor,
         )
     document = metrics_document(
         found.result,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -37,7 +38,7 @@ from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
-from navirl_cli.demos.recordings import extract_recordings
+from navirl_cli.demos.recordings import Recordings, extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.text import to_text
 from navirl_cli.files import Input
@@ -258,12 +259,25 @@ def extract(
         found = extract_recordings(
             logs, settings, options, join=join, labels=labels, executor=executor, progress=update
         )
+    _write(found, output.path, list(map(Input.of, files)), said, gain=gain, as_json=as_json, force=force)
+
+
+def _write(
+    found: Recordings,
+    path: Path,
+    files: Sequence[Input],
+    said: dict[str, Any],
+    *,
+    gain: bool,
+    as_json: bool,
+    force: bool,
+) -> None:
+    """Write the demonstrations of all logs to one file, and say what they are."""
     demonstrations = found.demonstrations()
-    inputs = [*found.inputs, *map(Input.of, files)]
-    document = demonstrations_document(demonstrations, inputs, said)
+    document = demonstrations_document(demonstrations, [*found.inputs, *files], said)
     if gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
-    write_json(output.path, "demonstrations", document, force=force)
+    write_json(path, "demonstrations", document, force=force)
     table, gains = trial_table(demonstrations), document.get("gain")
     if as_json:
         echo_json({"trials": table.records(), "gain": gains})

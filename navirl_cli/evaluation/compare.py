@@ -1,6 +1,7 @@
 """Demonstrated paths beside learnt ones and beside paths that do not depend on people's wishes."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from navirl_cli.evaluation.metrics import NO_REWARD, PAPER_METRICS, Metric, Valu
 from navirl_cli.evaluation.motion import PERSON_RADIUS_M, Drive
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of
+from navirl_cli.parallel import map_in_order
 
 DRIVEN, ON_GRID, LEARNT, NOMINAL, AVOIDANCE = "driven", "driven, on grid", "learnt", "nominal", "avoidance"
 #: The types of paths, in the order of the tables; several rewards have "learnt, NAME" each.
@@ -49,6 +51,7 @@ def compare(
     metrics: Sequence[Metric] = PAPER_METRICS,
     fields: Collection[str] = (),
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Comparison:
     """Measure demonstrations and, in the same scenes, learnt and baseline paths.
 
@@ -56,10 +59,11 @@ def compare(
         demonstrations: What was driven.
         rewards: Learnt rewards by name; none to measure no learnt paths.
         precision: How many paths to draw from a policy in each scene.
-        rng: Source of randomness.
+        rng: Source of randomness. Each policy in each scene has a stream of its own.
         metrics: To compute; others cost nothing.
         fields: Names of FIELDS to group by; none for condition, cycle and set.
         progress: Called with demonstrations done and in all.
+        executor: Where paths of policies are drawn and measured; by default here. The results are the same.
 
     Returns:
         The metrics.
@@ -72,14 +76,16 @@ def compare(
     lines = list(_lines_of(demonstrations, scenes := scenes_of(demonstrations), notes))
     where = _shown(demonstrations, scenes, lines)
     rows: list[Measured] = []
+    for one, line, shown in zip(demonstrations, lines, where, strict=True):
+        rows.append(measured(one, line, shown.nominal_m, metrics, group_of(one, fields)))
+        if progress is not None and not rewards:
+            progress(len(rows), len(demonstrations))
     drawn: dict[tuple[str, Shown], Drawn] = {}
-    for number, (one, shown) in enumerate(zip(demonstrations, where, strict=True)):
-        rows.append(measured(one, lines[number], shown.nominal_m, metrics, group_of(one, fields)))
-        for name, reward in rewards.items():
-            if (name, shown) not in drawn:
-                drawn[name, shown] = draw(reward, shown, metrics, precision, rng)
+    for key, paths in _drawn(list(dict.fromkeys(where)), rewards, metrics, precision, rng, executor):
+        drawn[key] = paths
         if progress is not None:
-            progress(number + 1, len(demonstrations))
+            count = len(rewards) * len(set(where))
+            progress(len(demonstrations) * len(drawn) // count, len(demonstrations))
     groups: list[GroupMetrics] = []
     learnt: list[dict[str, Values]] = [{} for _ in rows]
     for group in by_group(demonstrations, fields):
@@ -99,6 +105,29 @@ def compare(
     return Comparison(tuple(groups), tuple(rows), tuple(notes), missing)
 
 
+def _drawn(
+    places: Sequence[Shown],
+    rewards: Mapping[str, Reward],
+    metrics: Sequence[Metric],
+    precision: Precision,
+    rng: np.random.Generator,
+    executor: Executor | None,
+) -> Iterator[tuple[tuple[str, Shown], Drawn]]:
+    """Paths of every reward in every scene, measured, each with its own stream of random numbers."""
+    if not rewards:
+        return
+    keys = [(name, shown) for shown in places for name in rewards]
+    streams = rng.spawn(len(keys))
+    work = [(rewards[name], shown, metrics, precision, own) for (name, shown), own in zip(keys, streams, strict=True)]
+    results = map(_draw, work) if executor is None else map_in_order(_draw, work, executor)
+    yield from zip(keys, results, strict=True)
+
+
+def _draw(work: tuple[Reward, Shown, Sequence[Metric], Precision, np.random.Generator]) -> Drawn:
+    """The same of one reward in one scene, with what travels to a process."""
+    return draw(*work)
+
+
 def learnt_type(name: str, rewards: Collection[str]) -> str:
     """The type of the paths of one of several rewards."""
     return LEARNT if len(rewards) == 1 else f"{LEARNT}, {name}"
@@ -113,6 +142,7 @@ def compare_files(
     metrics: Sequence[Metric] = PAPER_METRICS,
     fields: Collection[str] = (),
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Comparison:
     """Measure the demonstrations of several files, as :func:`compare` does those of one.
 
@@ -125,12 +155,13 @@ def compare_files(
         metrics: To compute.
         fields: To group by.
         progress: Called with demonstrations done and in all.
+        executor: As of :func:`compare`.
     """
     found = []
     done, count = 0, sum(map(len, files.values()))
     for name, own in files.items():
         update = None if progress is None else (lambda n, _all, done=done: progress(done + n, count))
-        one = compare(own, rewards, precision, rng, metrics=metrics, fields=fields, progress=update)
+        one = compare(own, rewards, precision, rng, metrics=metrics, fields=fields, progress=update, executor=executor)
         done += len(own)
         groups = tuple(replace(row, group=name_in(files, name, row.group)) for row in one.groups)
         rows = tuple(

@@ -1,6 +1,7 @@
 """What is asked of an evaluation, and its answers: demonstrations of several files, pairs, ranks."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,6 +105,7 @@ def answers_to(
     precision: Precision,
     rng: np.random.Generator,
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Answers:
     """Measure, compare and rank.
 
@@ -114,12 +116,15 @@ def answers_to(
         precision: How many paths to draw.
         rng: Source of randomness.
         progress: Called with demonstrations done and in all.
+        executor: Where paths of policies are drawn and measured; by default here.
 
     Raises:
         NavirlError: As of :func:`~navirl_cli.evaluation.compare.compare`.
     """
     files, fields = asked.files, asked.fields
-    result = compare_files(files, rewards, precision, rng, metrics=metrics, fields=fields, progress=progress)
+    result = compare_files(
+        files, rewards, precision, rng, metrics=metrics, fields=fields, progress=progress, executor=executor
+    )
     compared = pairs_of_all(result, asked.pairs, files, rewards, metrics, fields, rng)
     ranks = Ranking()
     if asked.ranked:

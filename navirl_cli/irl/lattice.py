@@ -1,6 +1,6 @@
 """The free cells of a grid as a graph."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +9,7 @@ from navirl_cli.arrays import FloatArray, IntArray
 from navirl_cli.demos.grid import MOVE_LENGTHS, MOVES, Grid
 from navirl_cli.errors import SceneError
 from navirl_cli.irl.graph import Graph
+from navirl_cli.irl.ordering import Ordering
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +23,15 @@ class Lattice(Graph):
     index: IntArray
     #: (n, 8) the state that each move leads to, -1 where the move is not possible.
     neighbours: IntArray
+    #: Orders of the cells by goal, for all scenes on it: thousands of scenes share few goals.
+    _orderings: dict[int, Ordering] = field(default_factory=dict, init=False, repr=False)
+
+    def ordering_to(self, goal: int) -> Ordering:
+        """The states by the length of their shortest 8-connected path to a goal, m; always the same object."""
+        if goal not in self._orderings:
+            cheapest = np.full(self.size, self.grid.resolution_m)
+            self._orderings[goal] = Ordering(self, goal, self.costs_to(goal, self.step_m), cheapest)
+        return self._orderings[goal]
 
     @staticmethod
     def around(grid: Grid, cell: IntArray) -> "Lattice":

@@ -70,9 +70,7 @@ class Scene:
     @cached_property
     def ordering(self) -> Ordering:
         """The states by the length of their shortest 8-connected path to the goal, m."""
-        lattice = self.lattice
-        cheapest = np.full(lattice.size, lattice.grid.resolution_m)
-        return Ordering(lattice, self.goal, lattice.costs_to(self.goal, lattice.step_m), cheapest)
+        return self.lattice.ordering_to(self.goal)
 
     @cached_property
     def turn_ordering(self) -> Ordering:

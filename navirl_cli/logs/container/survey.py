@@ -223,6 +223,14 @@ class Survey:
         size = self._chunk_size(at, length, head, limit)
         if size is None:
             raise _BrokenError(f"a chunk record of {length} bytes claims {head.data_size} bytes of data")
+        if size != length:
+            self._damage.add(
+                at,
+                at + HEAD_SIZE,
+                f"a chunk record gives its length as {length} bytes, expected {size} by its header; it was read by its "
+                "header",
+                (head.start_ns, head.end_ns) if head.end_ns else None,
+            )
         self._compressed |= bool(head.compression)
         span = (head.start_ns, head.end_ns) if head.end_ns else None
         stop = at + HEAD_SIZE + size

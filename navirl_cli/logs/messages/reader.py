@@ -277,7 +277,12 @@ def check(path: Log, progress: Callable[[float], None] | None = None, threads: i
                 and len(found[channel.id]) == len(listed[channel.id])
                 and not np.array_equal(found[channel.id], listed[channel.id])
             ]
-            damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in (*missing, *wrong))]
+            fewer = [
+                f"the message indexes list {count} messages of {channel.topic}, {len(found[channel.id])} were found"
+                for channel in log.channels
+                if channel.id in found and (count := len(listed.get(channel.id, ()))) < len(found[channel.id])
+            ]
+            damage = [*log.damage, *(Damage(log.path, 0, log.size, text) for text in (*missing, *fewer, *wrong))]
         if not missing:
             break
     return damage
