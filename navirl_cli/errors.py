@@ -98,6 +98,16 @@ def joined(reasons: Iterable[str], prefix: str = "") -> str:
     return "; ".join(shown)
 
 
+def counted(number: int, what: str) -> str:
+    """A number with its noun, as in "1 trial" and "2 trials".
+
+    Args:
+        number: Of things.
+        what: The noun for one of them, whose plural ends with s.
+    """
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def brief(value: object) -> str:
     """A value as a message shows it: on one line, cut to the length of a line; what is cut is never written out."""
     text, cut = "", False

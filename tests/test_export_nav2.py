@@ -207,7 +207,10 @@ def test_what_costs_cannot_hold_is_said(reward, planner, field, message):
     assert message in lines[0]
     apart = lost(Nav2Export(Passing(CostModel(PAPER, navfn(), 0.1), 0.5, 0.1), Distro.JAZZY, 0.3))
     assert apart == [
-        "with costs of people the planner passes a person on its line at 0.10 m, paths of the policy at 0.50 m"
+        (
+            "with costs of people the planner passes a person on its line at 0.10 m, paths of the policy at 0.50 m: "
+            "by these alone its path of least cost has a distance of its own"
+        )
     ]
 
 

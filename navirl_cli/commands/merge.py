@@ -9,6 +9,7 @@ from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.commands.shared import check_output, echo, force_option, output_option, say
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.errors import counted
 
 
 @click.command(
@@ -35,6 +36,6 @@ def merge(demos: tuple[Path, ...], output: Path, force: bool) -> None:
     write_json(output, "demonstrations", content, force=force)
     people = {one["participant"] for one in content["demonstrations"]}
     count = len(people)
-    echo(f"{output}: {len(content['demonstrations'])} demonstrations of {count} participant{'s' * (count != 1)}")
+    echo(f"{output}: {counted(len(content['demonstrations']), 'demonstration')} of {counted(count, 'participant')}")
     for line in notes:
         say(line)

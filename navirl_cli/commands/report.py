@@ -1,6 +1,6 @@
 """``navirl report``: one page on demonstrations and the reward learnt from them."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,8 +22,9 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, as_options, section
 from navirl_cli.demos.extract import ExtractSettings
+from navirl_cli.documents.document import Block, Bullets
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.files import Input, replacing
 
@@ -98,8 +99,14 @@ def report(
         asked += ["--person", person] if person is not None else []
         asked += ["--samples", str(samples), "--seed", str(seed)]
         made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
-        page = to_html(report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made))
+        found = report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made)
+        page = to_html(replace(found, blocks=tuple(map(_with_options, found.blocks))))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)
     finish(result.notes)
+
+
+def _with_options(block: Block) -> Block:
+    """A list of the page with arguments shown as options; running text holds formulas, and stays."""
+    return Bullets(tuple(map(as_options, block.items))) if isinstance(block, Bullets) else block

@@ -73,7 +73,7 @@ def _nav2(reward: Reward, h_m: float, radius_m: float) -> list[Row]:
                 "factor",
                 model.people_factor,
                 "1",
-                "planner passes people as the policy does, by their costs alone",
+                "passing distance nearest to the policy's, by costs of people alone",
             )
         )
         if name == "smac2d":

@@ -115,11 +115,12 @@ def lost(export: Nav2Export) -> list[str]:
             f"a person's cost would reach {model.amplitude:.0f}, above the {model.peak:.0f} that a free cell may have: "
             f"it is capped, and flat within {flat:.2f} m of the person"
         )
+    alone = ": by these alone its path of least cost has a distance of its own"
     for what, one in export.passings:
         if abs(one.planner_m - one.policy_m) > _APART_M:
             found.append(
                 f"with costs of {what} the planner passes a person on its line at {one.planner_m:.2f} m, paths of the "
-                f"policy at {one.policy_m:.2f} m"
+                f"policy at {one.policy_m:.2f} m{alone if what == 'people' else ''}"
             )
     problem = export.problem
     if problem is not None and (export.field is not Field.PEOPLE or len(problem.scene.people_m) > 1):

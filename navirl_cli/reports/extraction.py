@@ -9,6 +9,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction
 from navirl_cli.demos.lines import path_length_m
 from navirl_cli.documents.tables import Cell, Column, Table
+from navirl_cli.errors import counted
 
 _TRIAL = (
     Column("trial"),
@@ -83,7 +84,8 @@ def log_table(logs: Sequence[Entry], unchanged: int) -> Table:
     shown = logs if len(logs) <= _MOST_LOGS else [one for one in logs if one.file is None]
     rows = tuple((one.log, one.status, one.trials, one.demonstrations, one.file) for one in shown)
     done = sum(one.demonstrations for one in logs)
-    note = f"{len(logs)} logs, {unchanged} of them unchanged and not read again; {done} demonstrations."
+    unread = f"{unchanged} of them unchanged and not read again"
+    note = f"{counted(len(logs), 'log')}, {unread}; {counted(done, 'demonstration')}."
     return Table(_LOG, rows, note=note)
 
 

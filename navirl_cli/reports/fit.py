@@ -13,6 +13,7 @@ from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
+from navirl_cli.errors import counted
 from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Ends
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
@@ -208,14 +209,15 @@ def likelihood_table(content: Mapping[str, Any]) -> Table:
 
 def counts(content: Mapping[str, Any]) -> str:
     """The data of the fit, and the effort, in one line."""
-    data = f"{len(content['demonstrations'])} demonstrations of {people(content)}, {content['steps']} steps"
-    return f"{data}; {content['iterations']} iterations, {content['evaluations']} evaluations from all starts."
+    taught = counted(len(content["demonstrations"]), "demonstration")
+    data = f"{taught} of {people(content)}, {counted(content['steps'], 'step')}"
+    effort = f"{counted(content['iterations'], 'iteration')}, {counted(content['evaluations'], 'evaluation')}"
+    return f"{data}; {effort} from all starts."
 
 
 def people(content: Mapping[str, Any]) -> str:
     """The number of participants from which the reward was learnt."""
-    count = len(content["participants"])
-    return f"{count} participant{'' if count == 1 else 's'}"
+    return counted(len(content["participants"]), "participant")
 
 
 def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:

@@ -209,8 +209,8 @@ def _paths_table(content: Content) -> Table:
     columns = (
         Column("path"),
         Column("length_m", "length m", decimals=2),
-        Column("min_distance_m", "min distance m", decimals=2),
-        Column("area_m2", "area m2", decimals=2),
+        Column("min_distance_m", "min. distance m", decimals=2),
+        Column("area_m2", "area under path m²", decimals=2),
     )
     named = [*((f"{n}", one) for n, one in enumerate(content["paths"][:_MOST], 1)), ("nominal", content["nominal"])]
     return Table(columns, tuple((name, *(one[column.name] for column in columns[1:])) for name, one in named))

@@ -7,7 +7,7 @@ from typing import Any
 from navirl_cli.demos.extract import ExtractSettings, extract
 from navirl_cli.documents.document import Block, Bullets, Heading
 from navirl_cli.documents.tables import Cell, Column, Table
-from navirl_cli.errors import NavirlError
+from navirl_cli.errors import NavirlError, counted
 from navirl_cli.logs.overview import Flow, Overview
 from navirl_cli.logs.roles.clocks import EARLIEST_NS, NS_PER_S
 from navirl_cli.logs.roles.topics import short_name
@@ -99,7 +99,7 @@ def _duration(view: Overview) -> str:
     if view.start_ns is None or view.end_ns is None:
         return "no messages"
     duration = (view.end_ns - view.start_ns) / NS_PER_S
-    return f"{_when(view.start_ns)}, {duration:.1f} s, {sum(f.topic.count for f in view.flows)} messages"
+    return f"{_when(view.start_ns)}, {duration:.1f} s, {counted(sum(f.topic.count for f in view.flows), 'message')}"
 
 
 def _when(t_ns: int) -> str:

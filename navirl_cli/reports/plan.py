@@ -30,8 +30,8 @@ def _paths_table(content: Mapping[str, Any]) -> Table:
     columns = [
         Column("path"),
         Column("length_m", "length m", decimals=2),
-        *([Column("min_distance_m", "min distance m", decimals=2)] if people else []),
-        Column("area_m2", "area m2", decimals=2),
+        *([Column("min_distance_m", "min. distance m", decimals=2)] if people else []),
+        Column("area_m2", "area under path m²", decimals=2),
         Column("log_probability", "log-probability nats", decimals=1),
     ]
     paths = content["paths"]
@@ -40,7 +40,7 @@ def _paths_table(content: Mapping[str, Any]) -> Table:
         (name, *(one[column.name] for column in columns[1:]))
         for name, one in (*named[:_MOST_ROWS], ("nominal", content["nominal"]))
     ]
-    note = "Min distance: from the robot's shell to a person's centre." if people else ""
+    note = "Min. distance: from the robot's shell to a person's centre." if people else ""
     if len(named) > _MOST_ROWS:
         note = f"{len(named) - _MOST_ROWS} more paths are in the file. {note}"
     return Table(tuple(columns), tuple(rows), note=note)

@@ -77,5 +77,5 @@ def sentences(found: Recommendation) -> list[str]:
 
 
 def _shown(one: Quantity) -> str:
-    interval = f" (95 % interval {one.lower:.2f} to {one.upper:.2f} m)" if isfinite(one.lower) else ""
-    return f"{one.value:.2f} m{interval}"
+    interval = f" (95 % interval {one.lower:z.2f} to {one.upper:z.2f} m)" if isfinite(one.lower) else ""
+    return f"{one.value:z.2f} m{interval}"

@@ -12,6 +12,7 @@ from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.tables import Column, Table
+from navirl_cli.errors import counted
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.lines import center_distance_m
 from navirl_cli.evaluation.meaning import Meaning, meanings
@@ -102,7 +103,7 @@ def report_of(
         Heading("Ranks of the demonstrations"),
         *_rank_blocks(learnt, ranked),
         Heading("Prediction of participants left out"),
-        *(validation_tables(content) or [Paragraph("Not computed; fit with `cross_validate` participant.")]),
+        *(validation_tables(content) or [Paragraph("Not computed; `navirl fit --cross-validate participant` does.")]),
         Heading("Trials"),
         trial_table(demonstrations),
         *([Bullets(tuple(notes))] if notes else []),
@@ -123,7 +124,7 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
     """The data, and how the fit ended."""
     everyone = people({"participants": {one.participant for one in demonstrations}})
     return (
-        f"{len(demonstrations)} demonstrations of {everyone}, and a navigation reward learnt from "
+        f"{counted(len(demonstrations), 'demonstration')} of {everyone}, and a navigation reward learnt from "
         f"{len(learnt.demonstrations)} of them, of {people(content)}. "
         f"The fit ended with the status **{learnt.status.value}**: {learnt.status.advice}."
     )

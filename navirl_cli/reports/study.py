@@ -12,6 +12,7 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
 from navirl_cli.documents.tables import Cell, Column, Interval, Spread, Table
+from navirl_cli.errors import counted
 from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import GroupMetrics, mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
@@ -95,9 +96,9 @@ def report_of(study: Study, context: StudyContext) -> Report:
         context: What else it states.
     """
     everyone = len({one.participant for one in study.demonstrations})
-    people = f"{everyone} participant{'s' if everyone > 1 else ''}"
+    people = counted(everyone, "participant")
     seconds = len(study.seconds)
-    summary = f"{people}, {len(study.demonstrations)} trials, {seconds} of them in the second force cycle."
+    summary = f"{people}, {counted(len(study.demonstrations), 'trial')}, {seconds} of them in the second force cycle."
     blocks: list[Block] = [
         Paragraph(f"{summary} {_INTRODUCTION}"),
         Heading("The paper's claims, tested with these participants"),
@@ -375,7 +376,7 @@ def _closeness_table(study: Study) -> Table:
 def _logs(context: StudyContext) -> list[Block]:
     """Logs, cells beside published ones, and notes."""
     logs = ", ".join(f"`{log}`" for log in context.logs)
-    blocks: list[Block] = [Paragraph(f"{len(context.logs)} logs: {logs}.")]
+    blocks: list[Block] = [Paragraph(f"{counted(len(context.logs), 'log')}: {logs}.")]
     if context.cells:
         other = sorted(name for name, same in context.cells if not same)
         extra = f"; others: {', '.join(other)}" if other else ""
