@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from navirl_cli.logs.load import LoadOptions, load_recording
+from navirl_cli.logs.roles import clocks
 from navirl_cli.logs.roles.clocks import Clock, Stamped, TimeSource
 from navirl_cli.logs.roles.columns import Columns
 from navirl_cli.logs.roles.message_types import WRENCHES
@@ -409,3 +410,12 @@ def test_messages_without_stamps_are_placed_by_their_receipt():
     asked = np.array([-4.0, 0.0, 3.21, 19.0, 30.0])
     found = clock.times(Stamped("/cmd_vel", nav.unix(asked), None))
     assert (found - nav.simulated(928.8, rate=0.5)(asked)) / 1e9 == pytest.approx(0.0, abs=1e-6)
+
+
+def test_late_messages_are_found_in_any_order_of_receipt():
+    rng = np.random.default_rng(3)
+    at_s, away_s = np.sort(rng.uniform(0, 60, 200)), -rng.exponential(0.3, 200)
+    order = rng.permutation(200)
+    expected = clocks._late(away_s, at_s)
+    assert 0 < expected.sum() < 200
+    np.testing.assert_array_equal(clocks._late(away_s[order], at_s[order]), expected[order])

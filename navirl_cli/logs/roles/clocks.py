@@ -190,12 +190,13 @@ def _late(away_s: FloatArray, at_s: FloatArray) -> BoolArray:
 
     Args:
         away_s: (n,) s, stamps - expected times at their receipt.
-        at_s: (n,) s of receipt, ascending.
+        at_s: (n,) s of receipt, in any order.
     """
-    numbers, starts = np.unique(np.floor(at_s / _LATENCY_S), return_index=True)
-    highest = np.pad(np.maximum.reduceat(away_s, starts), 1, constant_values=-np.inf)
+    numbers, place = np.unique(np.floor(at_s / _LATENCY_S), return_inverse=True)
+    highest = np.full(len(numbers) + 2, -np.inf)
+    np.maximum.at(highest, place + 1, away_s)
     near = np.max([highest[:-2], highest[1:-1], highest[2:]], axis=0)
-    late: BoolArray = np.repeat(near, np.diff(np.append(starts, len(at_s)))) - away_s > APART_S
+    late: BoolArray = near[place] - away_s > APART_S
     return late if len(numbers) > 1 else np.zeros(len(at_s), dtype=np.bool_)
 
 
