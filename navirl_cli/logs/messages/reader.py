@@ -198,6 +198,8 @@ class _Walk:
     seen: Counter[int] = field(default_factory=Counter)
     #: The reasons why channels cannot be decoded, by channel.
     unusable: dict[int, str] = field(default_factory=dict)
+    #: Those of them whose messages the walk met, whatever the statistics count.
+    met: set[int] = field(default_factory=set)
 
     def key(self, channel: Channel) -> TopicKey:
         """The wanted topic that a channel belongs to: its name, or its name with the type where types are named."""
@@ -209,6 +211,7 @@ class _Walk:
             self.seen[decoded.channel.id] += count
             self.batches[self.key(decoded.channel)].append(decoded)
             progress(log.position / log.size)
+        self.met = set(self.unusable)
         for channel in log.channels:
             self.wanted(channel)
 
@@ -233,7 +236,11 @@ class _Walk:
     def undecodable(self, log: LogFile) -> list[str]:
         """The reasons why channels cannot be decoded, without those that have no messages."""
         counted = _counted(log)
-        return [text for number, text in self.unusable.items() if counted is None or counted.get(number)]
+        return [
+            text
+            for number, text in self.unusable.items()
+            if counted is None or counted.get(number) or number in self.met
+        ]
 
     def missing(self, log: LogFile) -> list[str]:
         """The wanted channels of which messages are missing."""
