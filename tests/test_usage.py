@@ -4,12 +4,14 @@ import ast
 import re
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from command_line import option_names
 
 import navirl_cli
 from navirl_cli.cli import cli
+from navirl_cli.commands import shared
 from navirl_cli.commands.usage import as_options
 from navirl_cli.errors import Number, counted, nearest, unknown
 from navirl_cli.logs.findings import Kind
@@ -167,6 +169,19 @@ def test_near_names_are_proposed(navirl, work, words, code, near):
         "Did", "did"
     )
     assert not list(Path().iterdir())
+
+
+def test_lines_of_progress_estimate_the_time_that_is_left(monkeypatch, capsys):
+    clock = iter([0.0, 30.0, 60.0, 300.0, 330.0])
+    monkeypatch.setattr(shared, "monotonic", lambda: next(clock))
+    with click.Context(cli), shared.progress_bar("fit", 8, line_every=2) as update:
+        for done, word in ((1, "a"), (2, "b"), (4, ""), (8, "c")):
+            update(done, word)
+    assert capsys.readouterr().err.splitlines() == [
+        "navirl: fit 2 of 8: b; about 3 min left",
+        "navirl: fit 4 of 8; about 5 min left",
+        "navirl: fit 8 of 8: c",
+    ]
 
 
 def test_a_number_chooses_the_words_beside_it():
