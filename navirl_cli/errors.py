@@ -108,6 +108,21 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
+class Number(int):
+    """A number of things that chooses words by itself: ``f"{n} message{n:|s} {n:is|are} lost"``.
+
+    As a format, two words with a bar between them give the first for 1 and the second otherwise; an empty format gives
+    the digits.
+    """
+
+    def __format__(self, words: str) -> str:
+        """The digits, or one of two words."""
+        if "|" not in words:
+            return super().__format__(words)
+        one, _, several = words.partition("|")
+        return one if self == 1 else several
+
+
 def brief(value: object) -> str:
     """A value as a message shows it: on one line, cut to the length of a line; what is cut is never written out."""
     text, cut = "", False

@@ -177,7 +177,7 @@ class TestResults:
         some = demos.select(cycle=2, participant=["p01", "p02"])
         assert [one.id for one in some] == ["p01/3", "p01/4", "p02/3", "p02/4"]
         assert some.sources() == demos.sources()
-        with pytest.raises(navirl.NavirlError, match=r"`cycle`: expected one of 'cycle 1', .* found 'cycle 9'"):
+        with pytest.raises(navirl.NavirlError, match=r"`cycle`: expected one of '1', .* found '9'"):
             demos.select(cycle=9)
         found = navirl.evaluate(demos, reward, metrics="length_m", samples=5)
         assert {one["id"] for one in found.document["demonstrations"]} == set(reward.demonstrations)

@@ -403,7 +403,7 @@ def test_a_fit_without_people_says_so_before_it_starts(files, tmp_path, navirl, 
     monkeypatch.setattr("navirl_cli.commands.fit.fit_reward", started)
     warned, ended = navirl("fit", "nobody.json", "-o", "reward.json", code=1).stderr.splitlines()
     assert warned == (
-        "navirl: none of the 4 demonstrations has people, so that the personal space (a_p, sigma_p) cannot be learnt "
+        "navirl: none of 4 demonstrations has people, so that the personal space (a_p, sigma_p) cannot be learnt "
         "from them; extract them again with a people topic, or give places with --person x,y"
     )
     assert ended == "navirl: started"

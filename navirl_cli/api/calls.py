@@ -79,7 +79,7 @@ from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
-from navirl_cli.reports.per_trial import write_per_trial
+from navirl_cli.reports.per_trial import check_per_trial, write_per_trial
 
 
 def extract(
@@ -467,6 +467,8 @@ def evaluate(
     rewards = _rewards(reward, everyone, person)
     if ranks and not len(rewards) == len(files) == 1:
         raise ArgumentError("`ranks` needs one `reward` and one file of demonstrations")
+    if per_trial is not None:
+        check_per_trial(Path(per_trial))
     measured = _metrics(metrics)
     fields = tuple(one_of(tuple(FIELDS), one, "by") for one in texts(by))
     drawing = Precision(

@@ -20,6 +20,7 @@ from navirl_cli.errors import (
     TruncatedError,
     WorkerLostError,
     brief,
+    counted,
     joined,
 )
 from navirl_cli.files import Input
@@ -111,7 +112,7 @@ def extract_recordings(
         raise failed[0]
     if not good:
         kind = TruncatedError if all(isinstance(error, TruncatedError) for error in failed) else DemonstrationError
-        raise kind(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
+        raise kind(f"none of {counted(len(failed), 'log')} can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),
