@@ -30,12 +30,13 @@ from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, like
 from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
+from navirl_cli.figures.layout import trim_height
 from navirl_cli.figures.overlay import driven, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
 from navirl_cli.figures.properties import bars_of, draw_properties, height_for
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
-from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
+from navirl_cli.figures.sheet import check_target, new_figure, save_figure
 from navirl_cli.figures.style import COLUMN_IN, FONTS, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 
