@@ -29,7 +29,7 @@ class Lattice(Graph):
     def ordering_to(self, goal: int) -> Ordering:
         """The states by the length of their shortest 8-connected path to a goal, m; always the same object."""
         if goal not in self._orderings:
-            cheapest = np.full(self.size, self.grid.resolution_m)
+            cheapest = np.broadcast_to(self.grid.resolution_m, self.size)
             self._orderings[goal] = Ordering(self, goal, self.costs_to(goal, self.step_m), cheapest)
         return self._orderings[goal]
 

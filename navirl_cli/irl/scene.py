@@ -78,7 +78,7 @@ class Scene:
         graph = TurnGraph.of(self.lattice, self.goal)
         cells = self.ordering
         return Ordering(
-            graph, graph.beginning_in(self.goal), cells.distance[graph.cell], np.full(graph.size, cells.step[0])
+            graph, graph.beginning_in(self.goal), cells.distance[graph.cell], np.broadcast_to(cells.step[0], graph.size)
         )
 
     @cached_property
