@@ -5,7 +5,7 @@ line prints it and exits with 1, or with 3 where all trials were left out as cut
 keeps its traceback.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar, Final, cast
 
 #: Largest number of names that a message lists.
@@ -96,6 +96,25 @@ def joined(reasons: Iterable[str], prefix: str = "") -> str:
     if len(own) > MOST_REASONS:
         shown.append(f"and {len(own) - MOST_REASONS} more")
     return "; ".join(shown)
+
+
+def refuse_beside(why: str, given: Mapping[str, object], instead: str) -> None:
+    """Refuse arguments that exclude another one, naming those that were given and what to do.
+
+    Args:
+        why: The other argument, and why it excludes them.
+        given: The arguments by name, which words may follow, with their values; those that are false or empty were not
+            given.
+        instead: What else to do than to leave them out.
+
+    Raises:
+        ArgumentError: One was given.
+    """
+    words = [name.partition(" ") for name, value in given.items() if value]
+    names = [f"`{name}`{space}{rest}" for name, space, rest in words]
+    if names:
+        listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+        raise ArgumentError(f"{why}: leave out {listed}, or {instead}")
 
 
 def counted(number: int, what: str) -> str:

@@ -122,7 +122,7 @@ def properties(
     """
     everyone = demonstrations_in(demos)
     if person is not None and reward is None:
-        raise ArgumentError("`person` goes with `reward`")
+        raise ArgumentError("`person` goes with `reward`: name one, or leave it out")
     reward = None if reward is None else of_one(reward, person)
     trained = [] if reward is None else [_trained(reward, everyone)]
     subset = subset_in(condition, cycle, set, participant, trial)

@@ -298,10 +298,12 @@ def _check_arguments(
     if len({*demos}) < len(demos):
         raise click.UsageError("DEMOS: expected different files, found one twice.")
     if ranks and len(demos) > 1:
-        raise click.UsageError("--ranks needs one file of demonstrations.")
+        raise click.UsageError(
+            "--ranks needs one file of demonstrations; join several with navirl merge, or leave out --ranks."
+        )
     refuse_unused("--reward", "samples", "error", "everything", used=bool(rewards))
     if ranks and len(rewards) != 1:
-        raise click.UsageError("--ranks needs one --reward.")
+        raise click.UsageError("--ranks needs one --reward; give one, or leave out --ranks.")
     stems = [path.stem for path in rewards]
     if twice := [stem for stem in stems if stems.count(stem) > 1]:
         raise click.UsageError(f"--reward: expected files of different names, found several {twice[0]}; rename one.")

@@ -1,6 +1,6 @@
 """From the logs that a user names to demonstrations: one bad recording does not spoil the others."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,6 +22,7 @@ from navirl_cli.errors import (
     brief,
     counted,
     joined,
+    refuse_beside,
 )
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
@@ -63,6 +64,22 @@ class Recordings:
     def lost(self) -> list[str]:
         """What was left out, damaged or skipped."""
         return [*self.left_out, *(line for one in self.extractions for line in (*one.damage, *one.skipped))]
+
+
+def check_no_wrench(
+    *, gain: bool, wrench_frame: str | None, force_scale: float, topics: Mapping[str, Collection[str]]
+) -> None:
+    """Refuse what needs the wrench, beside the wish to leave it out; arguments as of the extraction.
+
+    Raises:
+        ArgumentError: Something does.
+    """
+    needing = {"gain": gain, "wrench_frame": wrench_frame, "force_scale": force_scale != 1}
+    refuse_beside(
+        "`no_wrench` leaves out the wrench, which these need",
+        {**needing, "topic wrench": "wrench" in topics},
+        "`no_wrench`",
+    )
 
 
 def extract_recordings(
