@@ -319,8 +319,8 @@ def fit(
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
         seed: Seed of the bootstrap.
-        workers: Number of processes for bootstrap and cross-validation, in place of threads of this process; faster.
-            Use it under ``if __name__ == "__main__":``.
+        workers: Number of processes for bootstrap, cross-validation, and sums over many scenes, in place of threads of
+            this process; faster. Use it under ``if __name__ == "__main__":``.
         cluster: Address of a running Dask scheduler that distributes them.
         executor: Any other executor that does so.
 
@@ -365,20 +365,15 @@ def fit(
     given = init if init is None or isinstance(init, Mapping) else reward_in(init)
     start = starting(terms_in(terms), given, None if earlier is None else earlier.reward)
     questions.check(selected.evidence, start)
-    found = fit_reward(
-        selected.evidence,
-        start,
-        weight,
-        prior=None if earlier is None else earlier.as_prior(person),
-        method=chosen(Method, method, "method"),
-    )
-    effect = reach_effect(selected.demonstrations, found, which, reach_m)
+    evidence, how = selected.evidence, chosen(Method, method, "method")
+    old = None if earlier is None else earlier.as_prior(person)
     with _executor(executor, workers, cluster) as where:
+        with evidence.kept_by(where) as kept:
+            found = fit_reward(kept, start, weight, prior=old, method=how)
+        effect = reach_effect(selected.demonstrations, found, which, reach_m, evidence, where)
         whole = which is Steps.ALL
         others = None if earlier is None else earlier.others
-        found, analyses, lost = answers(
-            selected.evidence, found, questions, others=others, whole_paths=whole, executor=where
-        )
+        found, analyses, lost = answers(evidence, found, questions, others=others, whole_paths=whole, executor=where)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect

@@ -195,9 +195,11 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
-    plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
-    effect = reach_effect(chosen, plain, Steps(steps), reach)
+    prior = None if earlier is None else earlier.as_prior(person)
     with workers_of(workers, cluster) as executor:
+        with evidence.kept_by(executor) as kept:
+            plain = _learn(kept, start, prior, l2, Method(method))
+        effect = reach_effect(chosen, plain, Steps(steps), reach, evidence, executor)
         whole = Steps(steps) is Steps.ALL
         others = None if earlier is None else earlier.others
         found, analyses, lost = answers(

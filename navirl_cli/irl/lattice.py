@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,10 @@ class Lattice(Graph):
     neighbours: IntArray
     #: Orders of the cells by goal, for all scenes on it: thousands of scenes share few goals.
     _orderings: dict[int, Ordering] = field(default_factory=dict, init=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross process borders as the map: what is computed from it is larger, and is computed again."""
+        return Lattice.around, (self.grid, self.cells[0])
 
     def ordering_to(self, goal: int) -> Ordering:
         """The states by the length of their shortest 8-connected path to a goal, m; always the same object."""
