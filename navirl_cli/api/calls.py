@@ -40,6 +40,7 @@ from navirl_cli.artefacts.demonstrations import (
     settings_document,
 )
 from navirl_cli.artefacts.metrics import metrics_document
+from navirl_cli.artefacts.options import option_words
 from navirl_cli.artefacts.persons import whose
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_document
 from navirl_cli.cluster import workers_of
@@ -200,7 +201,7 @@ def extract(
     labels = None if table is None else read_labels(table)
     with _executor(executor, workers, cluster) as where:
         found = extract_recordings(logs, settings, options, join=join, labels=labels, executor=where)
-    said = settings_document(settings, options, map_file, table)
+    said = settings_document(settings, options, map_file, table, join=join)
     return _extracted(found, said, [one for one in (map_file, table) if one is not None])
 
 
@@ -336,6 +337,7 @@ def fit(
         >>> reward["c0"]  # per metre
         -49.02...
     """
+    words = option_words({name: value for name, value in locals().items() if name != "demos"}, fit.__kwdefaults__ or {})
     questions = Questions(
         correct_bias,
         None if bootstrap is None else int(within("bootstrap", bootstrap, 2, 100_000)),
@@ -383,6 +385,7 @@ def fit(
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
     )
+    document["options"] = words
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
     notes = (

@@ -29,7 +29,7 @@ from navirl_cli.commands.shared import (
     workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
-from navirl_cli.commands.usage import Command, Example, as_options, section
+from navirl_cli.commands.usage import Command, Example, as_options, given_words, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
@@ -208,6 +208,7 @@ def fit(
     )
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
+    document["options"] = given_words()
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)
