@@ -44,7 +44,8 @@ from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
-from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
+from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 
 
 @click.command(

@@ -24,7 +24,6 @@ from navirl_cli.reports.evidence import reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
-    cannot_learn,
     correlation_table,
     formula,
     interval_notes,
@@ -33,10 +32,9 @@ from navirl_cli.reports.fit import (
     parameter_table,
     people,
     profile_table,
-    remarks,
     validation_tables,
-    warnings,
 )
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 from navirl_cli.reports.made import Made, made_blocks
 from navirl_cli.reports.persons import person_blocks
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
