@@ -21,7 +21,7 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.profile import fall_at
 from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.fit import warnings
+from navirl_cli.reports.fit_remarks import warnings
 
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -4.0, -4.0, 3.0))

@@ -92,8 +92,8 @@ def test_it_says_how_it_was_made(page):
     )
     for command in (
         "navirl extract p01.mcap -o demos.json",
-        "navirl fit demos.json --cycle 2 -o reward.json",
-        "navirl report demos.json reward.json --all --samples 100 --seed 0 -o report.html",
+        "navirl fit demos.json --cycle 2 --profile c0 -o reward.json",
+        "navirl report demos.json reward.json --all --samples 100 -o report.html",
     ):
         assert f"<code>{command}</code>" in made
 

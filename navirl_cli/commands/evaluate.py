@@ -35,7 +35,8 @@ from navirl_cli.demos.subset import FIELDS
 from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import unknown
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.questions import answers_to, asked_of
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
