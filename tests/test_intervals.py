@@ -66,7 +66,7 @@ def test_an_end_takes_few_evaluations_of_the_likelihood(evidence, found, monkeyp
     begun = made[0].evaluations
     intervals(evidence, replace(found, scanned=()), Kind.PROFILE)
     assert len(found.scanned) > 8
-    assert begun < made[1].evaluations < 60, "8 ends, their other branches, and the profile; the scan of the fit spares a part"
+    assert begun < made[1].evaluations < 60, "8 ends and the profile; the scan of the fit spares a part"
 
 
 class Twin:
