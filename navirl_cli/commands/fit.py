@@ -116,7 +116,7 @@ from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
         type=Choice([kind.value for kind in ASKED]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
         f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
-        "wald; wald with a term of turns, where profiles take minutes.",
+        "wald.",
     ),
     click.option(
         "--bootstrap",
