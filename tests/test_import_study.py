@@ -73,7 +73,8 @@ def test_what_is_lost_is_reported_and_the_rest_is_written(navirl, study):
     (study / "runs" / "p2" / "joystick_parcours_times.txt").unlink()
     result = navirl("import-study", "runs", "-o", "logs", code=3)
     assert sorted(path.name for path in (study / "logs").iterdir()) == ["p1.mcap", "p2.mcap"]
-    broken, missing, nothing = result.stderr.splitlines()
+    said, broken, missing, nothing = result.stderr.splitlines()
+    assert said.startswith("navirl: the study has no forces")
     assert broken == (
         "navirl: runs/p1/joystick_demos.pkl: expected only names that the published study needs, found os.system "
         "before byte 11; no code was run; download the file from its authors again"
