@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite, nan
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -206,21 +207,25 @@ def fit(
         found, analyses, lost = answers(
             evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
         )
-    document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
-    )
+    inputs = [Input.of(path) for path in files]
+    document = reward_document(found, chosen, inputs, selected.resolution_m, analyses, steps, effect)
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
     document["options"] = given_words()
     write_json(output, "reward", document, force=force)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
+    _show(document, [*notes, *reach_unused(document, reach)], as_json=as_json)
+    finish(lost)
+
+
+def _show(document: dict[str, Any], notes: Sequence[str], *, as_json: bool) -> None:
+    """Print the fit, and below it what a reader should know of it."""
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
-    for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
-    finish(lost)
 
 
 def _learn(evidence: Evidence, start: Reward, prior: Prior | None, l2: float, method: Method) -> Fit:
