@@ -14,7 +14,7 @@ import numpy as np
 
 from navirl_cli.api.arguments import one_of, subset_in, texts, within
 from navirl_cli.api.calls import policy as policy_in
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
+from navirl_cli.api.given import AnyReward, Demos, PathLike, demonstrations_in, learnt_in, of_one, reward_in
 from navirl_cli.api.results import ScenePolicy
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
@@ -61,7 +61,7 @@ class PageOptions(TypedDict, total=False):
 
 
 def paths(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     *,
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
@@ -76,7 +76,7 @@ def paths(
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         condition: Only trials of these conditions, as of :func:`navirl_cli.fit`; so are cycle, set, participant and
             trial.
         cycle: Only trials of these cycles.
@@ -210,7 +210,7 @@ def actions(
 
 
 def properties(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward | None = None,
     *,
     person: str | None = None,
@@ -228,7 +228,7 @@ def properties(
     """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
@@ -283,7 +283,7 @@ def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[P
 
 
 def ranks(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward,
     *,
     person: str | None = None,
@@ -301,7 +301,7 @@ def ranks(
     """Draw the ranks of demonstrations among paths of the policy by group: uniform if the policy is right.
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: A reward, its file, or values by name of parameter.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.

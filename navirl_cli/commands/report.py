@@ -6,8 +6,8 @@ from tempfile import TemporaryDirectory
 
 import click
 
+from navirl_cli.artefacts.joined import read_content
 from navirl_cli.artefacts.rewards import check_cells, learnt_of, reward_content
-from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
@@ -42,7 +42,7 @@ from navirl_cli.files import Input, replacing
 @section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
 def report(
-    demos: Path,
+    demos: tuple[Path, ...],
     reward: Path,
     choosing: Choosing,
     person: str | None,
@@ -68,8 +68,8 @@ def report(
     from navirl_cli.reports.made import Made, changed_settings, subset_words
     from navirl_cli.reports.reward import METRICS, report_of
 
-    check_output(output, [demos, reward], force=force)
-    everyone = demonstrations_in(demos)
+    check_output(output, [*demos, reward], force=force)
+    everyone = demonstrations_in(*demos)
     content = reward_content(reward, person)
     learnt = learnt_of(content, str(reward))
     check_cells(learnt, everyone, str(reward))
@@ -91,20 +91,25 @@ def report(
         figures = draw_report(
             demonstrations, learnt.reward.parameters, shown, result.groups, learnt.profiles, Path(folder)
         )
-        extracted = read_json(demos, "demonstrations")
-        made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (demos, reward))]
+        extracted, _ = read_content(demos)
+        made_from = [*extracted["inputs"], *(vars(Input.of(path)) for path in (*demos, reward))]
         logs = tuple(one["file"] for one in extracted["inputs"])
         changed = changed_settings(extracted["settings"], asdict(ExtractSettings()))
         asked = [*subset_words(choosing.subset), *(["--all"] if choosing.everything else [])]
         asked += ["--person", person] if person is not None else []
         asked += ["--samples", str(samples), "--seed", str(seed)]
-        made = Made(demos.name, reward.name, logs, changed, tuple(asked), seed, everyone)
+        made = Made(tuple(map(_name, demos)), reward.name, logs, changed, tuple(asked), seed, everyone)
         found = report_of(demonstrations, learnt, content, result, ranked, figures, made_from, made)
         page = to_html(replace(found, blocks=tuple(map(_with_options, found.blocks))))
     with replacing(output, force=force) as temporary:
         temporary.write_text(page, encoding="utf-8")
     click.echo(output)
     finish(result.notes)
+
+
+def _name(path: Path) -> str:
+    """The name of a file, or of a folder as extract takes it."""
+    return f"{path.resolve().name}/" if path.is_dir() else path.name
 
 
 def _with_options(block: Block) -> Block:

@@ -19,8 +19,8 @@ _OPTIONS = {"method": "--method", "l2": "--l2", "learnt_from": "--steps", "terms
 class Made:
     """The files of a report and how it was asked for."""
 
-    #: Names of the files of demonstrations and of the reward.
-    demos: str
+    #: Names of the files and folders of demonstrations, and of the reward.
+    demos: tuple[str, ...]
     reward: str
     #: Names of the logs, and the settings of extraction that are no defaults, by name.
     logs: tuple[str, ...]
@@ -77,10 +77,11 @@ _USUAL = {"time": "header", "force_scale": 1.0, "wrench": True}
 
 def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
     """Command lines; none for a fit with a prior, whose file is not known."""
-    extract = shlex.join(["navirl", "extract", *made.logs, "-o", made.demos])
-    report = shlex.join(["navirl", "report", made.demos, made.reward, *made.options, "-o", "report.html"])
+    # which log is in which of several files is not known
+    extract = [shlex.join(["navirl", "extract", *made.logs, "-o", *made.demos])] if len(made.demos) == 1 else []
+    report = shlex.join(["navirl", "report", *made.demos, made.reward, *made.options, "-o", "report.html"])
     if content["prior"] or not taught:
-        return [extract, report]
+        return [*extract, report]
     changed = [
         word
         for name, option in _OPTIONS.items()
@@ -88,7 +89,7 @@ def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made:
         for word in (option, ",".join(content[name]) if name == "terms" else f"{content[name]}")
     ]
     chosen = selection_words(made.everyone, taught)
-    return [extract, shlex.join(["navirl", "fit", made.demos, *chosen, *changed, "-o", made.reward]), report]
+    return [*extract, shlex.join(["navirl", "fit", *made.demos, *chosen, *changed, "-o", made.reward]), report]
 
 
 def selection_words(everyone: Sequence[Demonstration], taught: Sequence[Demonstration]) -> list[str]:
