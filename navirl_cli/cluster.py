@@ -158,7 +158,9 @@ def workers_of(workers: int | None, cluster: str | None) -> Iterator[Executor]:
         yield Local(workers)
         return
     if workers is not None:
-        raise ArgumentError("`workers` and `cluster` exclude each other: a scheduler has its own workers")
+        raise ArgumentError(
+            "`workers` and `cluster` exclude each other: a scheduler has its own workers; leave out `workers`"
+        )
     with connected(cluster) as executor:
         yield executor
 

@@ -168,7 +168,7 @@ def test_a_bad_log_among_good_ones_is_left_out_with_exit_code_3(navirl, tmp_path
     assert [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]] == ["a/1"]
     other = log_with(tmp_path, "c.mcap", wrench_topics=())
     both = navirl("extract", bad, other, "-o", "other.json", code=1).stderr
-    assert both.startswith("navirl: none of the 2 logs can be used: 2 logs: no wrench: ")
+    assert both.startswith("navirl: none of 2 logs can be used: 2 logs: no wrench: ")
     assert both.count("no wrench") == 1
 
 

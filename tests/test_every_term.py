@@ -19,9 +19,6 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.terms import TERMS, registry
 from navirl_cli.reports import recommendation
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("every_term")
-
 SCENE = make.scene_on(make.open_grid(16, 12), [0, 5], [15, 5], [[0.8, 0.3]])
 OWN = Path(__file__).with_name("toy_term.py")
 EVERY = (*TERMS, "egg")

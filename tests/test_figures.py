@@ -9,8 +9,9 @@ from matplotlib.colors import to_hex
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ground import window_around
+from navirl_cli.figures.layout import trim_height
 from navirl_cli.figures.paths import draw_paths
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 
 

@@ -12,11 +12,12 @@ from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures.cells import LIKELY_VISITS, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.conditions import draw_path_panels
 from navirl_cli.figures.ground import CROPPED_M, cropped_to, inside
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.overlay import Overlay, alike
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.scale import length_m
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.solved import SolvedScene
 

@@ -15,8 +15,9 @@ from navirl_cli.errors import DemonstrationError, SceneError
 from navirl_cli.figures import times
 from navirl_cli.figures.cells import LEAST_VISITS, draw_reward
 from navirl_cli.figures.conditions import draw_path_panels
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.policies import draw_policy_and_reward
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.solved import SolvedScene

@@ -7,7 +7,7 @@ import factories as make
 import numpy as np
 import pytest
 
-from navirl_cli.irl import intervals as module
+from navirl_cli.irl import ends as module
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind, default_kind, intervals, quantile

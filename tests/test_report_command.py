@@ -20,9 +20,6 @@ from navirl_cli.evaluation.meaning import half_distance_m
 from navirl_cli.reports.made import changed_settings, selection_words
 from navirl_cli.reports.reward import in_words
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("report_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
 
 

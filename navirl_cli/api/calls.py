@@ -49,7 +49,7 @@ from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
-from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.recordings import Recordings, check_no_wrench, extract_recordings
 from navirl_cli.demos.subset import FIELDS
 from navirl_cli.demos.trials import Split
 from navirl_cli.errors import ArgumentError, NavirlWarning
@@ -80,7 +80,7 @@ from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
-from navirl_cli.reports.per_trial import write_per_trial
+from navirl_cli.reports.per_trial import check_per_trial, write_per_trial
 
 
 def extract(
@@ -165,8 +165,8 @@ def extract(
     """
     if not logs:
         raise ArgumentError("`logs`: expected at least one log, found none")
-    if no_wrench and (gain or wrench_frame or force_scale != 1):
-        raise ArgumentError("`no_wrench` excludes `gain`, `wrench_frame` and `force_scale`, which need the wrench")
+    if no_wrench:
+        check_no_wrench(gain=gain, wrench_frame=wrench_frame, force_scale=force_scale, topics=topics_in(topic))
     settings = ExtractSettings(
         split=chosen(Split, split, "split"),
         resolution_m=within("resolution", resolution, 0.01, 2),
@@ -462,7 +462,11 @@ def evaluate(
     everyone = [one for own in files.values() for one in own]
     rewards = _rewards(reward, everyone, person)
     if ranks and not len(rewards) == len(files) == 1:
-        raise ArgumentError("`ranks` needs one `reward` and one file of demonstrations")
+        raise ArgumentError(
+            "`ranks` needs one `reward` and one file of demonstrations: give one of each, or leave it out"
+        )
+    if per_trial is not None:
+        check_per_trial(Path(per_trial))
     measured = _metrics(metrics)
     fields = tuple(one_of(tuple(FIELDS), one, "by") for one in texts(by))
     drawing = Precision(
@@ -542,7 +546,7 @@ def _rewards(
     """Rewards by name; one alone is named "learnt"."""
     if reward is None:
         if person is not None:
-            raise ArgumentError("`person` goes with `reward`")
+            raise ArgumentError("`person` goes with `reward`: name one, or leave it out")
         return {}
     several = isinstance(reward, Mapping) and not all(isinstance(value, int | float) for value in reward.values())
     named: Mapping[str, Any] = reward if several else {LEARNT: reward}  # type: ignore[assignment]

@@ -117,7 +117,7 @@ def study(
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
         demonstrations = given.demonstrations
-        with progress_bar("fit", len(people_of(demonstrations)) + 1, lines=True) as update:
+        with progress_bar("fit", len(people_of(demonstrations)) + 1, line_every=1) as update:
             found = study_of(
                 demonstrations,
                 given.completion_s,

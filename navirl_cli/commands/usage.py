@@ -89,7 +89,7 @@ def _exclusive(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if value:
         own, other = (QUIET, VERBOSE) if param.name == "quiet" else (VERBOSE, QUIET)
         if ctx.meta.get(other):
-            raise click.UsageError("--quiet and --verbose exclude each other.")
+            raise click.UsageError("--quiet and --verbose exclude each other; leave out one.")
         ctx.meta[own] = True
 
 

@@ -11,8 +11,9 @@ from matplotlib.legend import Legend
 from navirl_cli.errors import SceneError
 from navirl_cli.figures.cells import EXTEND, REWARD, VISITS, DrawnCells, draw_policy, draw_reward
 from navirl_cli.figures.ground import Window
+from navirl_cli.figures.layout import PAD_IN
 from navirl_cli.figures.marks import merged_handles
-from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
+from navirl_cli.figures.sheet import common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
 from navirl_cli.irl.solved import SolvedScene
 

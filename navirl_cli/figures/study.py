@@ -12,8 +12,9 @@ from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
 from navirl_cli.figures.conditions import draw_path_panels
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.policies import TitledScene, draw_policy_and_reward
-from navirl_cli.figures.sheet import new_figure, save_figure, settle
+from navirl_cli.figures.sheet import new_figure, save_figure
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
 from navirl_cli.parallel import map_in_order
 from navirl_cli.reports.study import FIGURES

@@ -13,7 +13,7 @@ from navirl_cli.artefacts.rewards import LearntReward, terms_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
-from navirl_cli.errors import counted
+from navirl_cli.errors import Number, counted
 from navirl_cli.irl.intervals import FEW_DEMONSTRATIONS, Ends
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
@@ -335,8 +335,9 @@ def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
     if any(len(demonstration.people_m) for demonstration in chosen):
         return []
     line = (
-        f"none of the {len(chosen)} demonstrations has people, so that the personal space (a_p, sigma_p) cannot be "
-        "learnt from them; extract them again with a people topic, or give places with `person` x,y"
+        f"none of {counted(len(chosen), 'demonstration')} has people, so that the personal space "
+        "(a_p, sigma_p) cannot be learnt from them; extract them again with a people "
+        "topic, or give places with `person` x,y"
     )
     return [line]
 
@@ -360,8 +361,9 @@ def remarks(
     alone = sum(demonstration.corrected is False for demonstration in chosen)
     if alone and not chosen_by:
         lines.append(
-            f"{alone} of {len(chosen)} demonstrations show no intervention: the reward also learns what the "
-            "robot does by itself; leave them out with `only_corrected`, or choose with `condition`"
+            f"{alone} of {counted(len(chosen), 'demonstration')} {Number(alone):shows|show} no intervention: "
+            "the reward also learns what the robot does by itself; leave "
+            "them out with `only_corrected`, or choose with `condition`"
         )
     twice = [] if earlier is None else sorted({d.id for d in chosen} & set(earlier.demonstrations))
     if twice:

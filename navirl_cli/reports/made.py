@@ -8,6 +8,7 @@ from typing import Any
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.subset import Subset
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph
+from navirl_cli.errors import counted
 
 #: Defaults of a fit, as its file names them.
 _FIT = {"method": "newton", "l2": 1e-3, "learnt_from": "all", "terms": ["length", "deviation", "personal-space"]}
@@ -44,7 +45,7 @@ def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
     start = ", ".join(f"{name} {value:g}" for name, value in content["initial"].items())
     how = f"Steps: {content['learnt_from']} ({content['steps']}); method {content['method']}"
     lines = [
-        f"Learnt from {len(used)} of {len(demonstrations)} demonstrations: {', '.join(used)}",
+        f"Learnt from {len(used)} of {counted(len(demonstrations), 'demonstration')}: {', '.join(used)}",
         f"{how}; regulariser {content['l2']:g}; {'with' if content['prior'] else 'without'} a prior; start: {start}",
     ]
     if made.settings:
