@@ -13,6 +13,7 @@ from navirl_cli.api.arguments import (
 )
 from navirl_cli.api.given import (
     AnyReward,
+    Demos,
     PathLike,
     demonstrations_in,
     files_behind,
@@ -41,7 +42,7 @@ from navirl_cli.reports.fit_remarks import warnings as fit_warnings
 
 
 def fit(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     *,
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
@@ -74,7 +75,7 @@ def fit(
     A fit that did not converge and an analysis that failed give a warning (:class:`~navirl_cli.errors.NavirlWarning`).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         terms: Terms whose sum the reward is: names, separated by commas or in a list, files as "my_term.py:MyTerm", or
             terms themselves; "length,deviation,personal-space" by default.
         init: Initial values: a reward, its file, or values by name.

@@ -143,7 +143,7 @@ from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 @workers_options
 @section("Output", output_option("Reward file to write."), json_option, force_option)
 def fit(
-    demos: Path,
+    demos: tuple[Path, ...],
     output: Path,
     terms: tuple[Term, ...],
     initial: str,
@@ -177,12 +177,16 @@ def fit(
     kind = None if intervals is None else Kind(intervals)
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
-    files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
+    files = [
+        *demos,
+        *([Path(initial)] if initial and "=" not in initial else []),
+        *([prior_file] if prior_file else []),
+    ]
     check_output(output, files, force=force)
     given = _given(initial)
     if prior_file is None:
         _start(terms, given)  # refuses wrong words before the work
-    everyone = demonstrations_in(demos)
+    everyone = demonstrations_in(*demos)
     selected = select(
         of_participant(everyone, person),
         choosing.subset,
