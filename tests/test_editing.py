@@ -98,7 +98,7 @@ def test_relabel_finds_the_trials_by_log_and_start(navirl):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (["p.mcap,1,2.0,,joystick,,"], "found several ways to place the table's 1 rows on its 3 demonstrations"),
+        (["p.mcap,1,2.0,,joystick,,"], "found several ways to place the table's 1 row on its 3 demonstrations"),
         (["x.mcap,1,2.0,,joystick,,"], "expected rows of trials of p.mcap, found none"),
     ],
 )

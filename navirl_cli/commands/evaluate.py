@@ -35,11 +35,12 @@ from navirl_cli.demos.subset import FIELDS
 from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import unknown
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
 from navirl_cli.evaluation.questions import answers_to, asked_of
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
-from navirl_cli.reports.per_trial import write_per_trial
+from navirl_cli.reports.per_trial import PER_TRIAL_ENDINGS, check_per_trial, write_per_trial
 
 
 class Shares(click.ParamType):  # type: ignore[type-arg]
@@ -170,9 +171,9 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
     ),
     click.option(
         "--per-trial",
-        type=OutputPath((".csv", ".parquet")),
-        help="Long table to write as well, one row for each trial, type of path and metric: .csv, or .parquet where "
-        "pandas and pyarrow are installed.",
+        type=OutputPath(PER_TRIAL_ENDINGS),
+        help="Long table to write as well, one row for each trial, type of path and metric: .csv, or .parquet "
+        "where pyarrow is installed.",
     ),
     output_option("File to write as well: .json, .csv, .md or .tex.", *ENDINGS, required=False),
     json_option,
@@ -220,6 +221,8 @@ def evaluate(
     outputs = [path for path in (output, per_trial) if path is not None]
     for path in outputs:
         check_output(path, [*demos, *rewards], force=force)
+    if per_trial is not None:
+        check_per_trial(per_trial)
     everyone = dict(zip(_names(demos), map(demonstrations_in, demos), strict=True))
     learnt = {path.stem: _reward_for(path, everyone, person) for path in rewards}
     trained = [one.trained([d for own in everyone.values() for d in own]) for one in learnt.values()]
@@ -296,10 +299,12 @@ def _check_arguments(
     if len({*demos}) < len(demos):
         raise click.UsageError("DEMOS: expected different files, found one twice.")
     if ranks and len(demos) > 1:
-        raise click.UsageError("--ranks needs one file of demonstrations.")
+        raise click.UsageError(
+            "--ranks needs one file of demonstrations; join several with navirl merge, or leave out --ranks."
+        )
     refuse_unused("--reward", "samples", "error", "everything", used=bool(rewards))
     if ranks and len(rewards) != 1:
-        raise click.UsageError("--ranks needs one --reward.")
+        raise click.UsageError("--ranks needs one --reward; give one, or leave out --ranks.")
     stems = [path.stem for path in rewards]
     if twice := [stem for stem in stems if stems.count(stem) > 1]:
         raise click.UsageError(f"--reward: expected files of different names, found several {twice[0]}; rename one.")

@@ -29,7 +29,7 @@ from navirl_cli.commands.shared import (
     workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
-from navirl_cli.commands.usage import Command, Example, as_options, section
+from navirl_cli.commands.usage import Command, Example, as_options, given_words, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
@@ -44,7 +44,8 @@ from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
-from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
+from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 
 
 @click.command(
@@ -195,9 +196,11 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
-    plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
-    effect = reach_effect(chosen, plain, Steps(steps), reach)
+    prior = None if earlier is None else earlier.as_prior(person)
     with workers_of(workers, cluster) as executor:
+        with evidence.kept_by(executor) as kept:
+            plain = _learn(kept, start, prior, l2, Method(method))
+        effect = reach_effect(chosen, plain, Steps(steps), reach, evidence, executor)
         whole = Steps(steps) is Steps.ALL
         others = None if earlier is None else earlier.others
         found, analyses, lost = answers(
@@ -208,6 +211,7 @@ def fit(
     )
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
+    document["options"] = given_words()
     write_json(output, "reward", document, force=force)
     if as_json:
         echo_json(document)

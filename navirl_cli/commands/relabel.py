@@ -12,6 +12,7 @@ from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.relabelling import relabelled
+from navirl_cli.errors import Number, counted
 
 
 @click.command(
@@ -45,7 +46,7 @@ def relabel(demos: Path, trials: Path, output: Path, force: bool) -> None:
     after, notes = relabelled(before, read_labels(trials))
     write_json(output, "demonstrations", relabelled_content(document, after), force=force)
     changed = sum(_labels(old) != _labels(new) for old, new in zip(before, after, strict=True))
-    echo(f"{output}: {changed} of {len(after)} demonstrations have other labels")
+    echo(f"{output}: {changed} of {counted(len(after), 'demonstration')} {Number(changed):has|have} other labels")
     for line in notes:
         say(line)
 

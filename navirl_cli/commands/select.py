@@ -10,6 +10,7 @@ from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.errors import counted
 
 
 @click.command(
@@ -34,4 +35,4 @@ def select(demos: Path, choosing: Choosing, output: Path, force: bool) -> None:
     everyone = demonstrations_of(document, str(demos))
     chosen = choosing.of(everyone)
     write_json(output, "demonstrations", some_of(document, {one.id for one in chosen}), force=force)
-    echo(f"{output}: {len(chosen)} of {len(everyone)} demonstrations")
+    echo(f"{output}: {len(chosen)} of {counted(len(everyone), 'demonstration')}")

@@ -241,19 +241,21 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def progress_bar(label: str, length: int | None = None, *, lines: bool = False) -> Iterator[Callable[[int, str], None]]:
+def progress_bar(
+    label: str, length: int | None = None, *, line_every: int | None = None
+) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, if stderr is a terminal.
 
     Args:
         label: The present work.
         length: Number of steps, or None if it is not known.
-        lines: Whether to print a line for each step elsewhere: for work of minutes.
+        line_every: After so many steps a line is printed elsewhere, for work of minutes; none without it.
 
     Yields:
         A function that takes the number of steps done and a short text on the present one.
     """
     if is_quiet() or not sys.stderr.isatty():
-        yield _by_lines(label, length, every_s=0.0 if lines else EVERY_S if is_verbose() else inf)
+        yield _by_lines(label, length, line_every, EVERY_S if is_verbose() else inf)
         return
     steps = None if length is not None else iter(int, 1)
     new = click.progressbar(
@@ -267,17 +269,29 @@ def progress_bar(label: str, length: int | None = None, *, lines: bool = False) 
         yield update
 
 
-def _by_lines(label: str, length: int | None, every_s: float) -> Callable[[int, str], None]:
-    """Progress as lines, at most one in a time, and one at the end; none where the time is infinite."""
-    last = -every_s
+def _by_lines(label: str, length: int | None, line_every: int | None, every_s: float) -> Callable[[int, str], None]:
+    """Progress as lines after so many steps, and after so much time, with an estimate of the time that is left."""
+    start = monotonic()
+    last = -inf
 
     def update(done: int, word: str) -> None:
         nonlocal last
-        if every_s < inf and (done == length or monotonic() - last >= every_s):
-            last = monotonic()
-            say(f"{label} {done}" + ("" if length is None else f" of {length}") + (f": {word}" if word else ""))
+        now = monotonic()
+        timely = every_s < inf and (now - last >= every_s or done == length)
+        if timely or (line_every and done % line_every == 0):
+            last = now
+            left = "" if length is None or not 0 < done < length else _left((now - start) / done * (length - done))
+            parts = ["" if length is None else f" of {length}", f": {word}" if word else "", left]
+            say(f"{label} {done}{''.join(parts)}")
 
     return update
+
+
+def _left(left_s: float) -> str:
+    """An estimated time in words; empty for a few seconds."""
+    if left_s < 10:
+        return ""
+    return f"; about {left_s:.0f} s left" if left_s < 90 else f"; about {left_s / 60:.0f} min left"
 
 
 @contextmanager

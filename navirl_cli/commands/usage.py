@@ -53,6 +53,21 @@ def refuse_unused(needs: str, *names: str, used: bool) -> None:
             raise click.UsageError(f"{max(param.opts, key=len)} goes with {needs}.")
 
 
+def given_words() -> list[str]:
+    """The options that the present command was given, by the user or by navirl.toml, as an artefact keeps them."""
+    from navirl_cli.artefacts.options import option_words
+
+    context = click.get_current_context()
+    given: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
+    for param in context.command.params:
+        known = context.get_parameter_source(param.name or "") not in {ParameterSource.DEFAULT, None}
+        if isinstance(param, click.Option) and known:
+            name = max(param.opts, key=len).removeprefix("--").replace("-", "_")
+            given[name], defaults[name] = context.params[param.name or ""], param.default
+    return option_words(given, defaults)
+
+
 class Example(NamedTuple):
     """A command that a reader can copy, and its purpose."""
 
@@ -89,7 +104,7 @@ def _exclusive(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if value:
         own, other = (QUIET, VERBOSE) if param.name == "quiet" else (VERBOSE, QUIET)
         if ctx.meta.get(other):
-            raise click.UsageError("--quiet and --verbose exclude each other.")
+            raise click.UsageError("--quiet and --verbose exclude each other; leave out one.")
         ctx.meta[own] = True
 
 

@@ -82,7 +82,7 @@ def _verdict(view: Overview, outcome: _Outcome) -> list[Block]:
     else:
         verdict = "extract has what it needs" if outcome.demonstrations else "extract refuses this log"
     count = outcome.demonstrations
-    found = [f"{count} trial{'s' if count > 1 else ''}, each a demonstration"] if count else []
+    found = [f"{counted(count, 'trial')}, each a demonstration"] if count else []
     return [Heading(verdict), Bullets((*found, *outcome.reasons, *(missing[name] for name in order)))]
 
 
