@@ -20,9 +20,6 @@ from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.metrics import METRICS
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("evaluate_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 
 

@@ -16,7 +16,7 @@ from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 from navirl_cli.study.measures import rows_of
 
 PRESENT = (study_data.ROOT / "expected.json").is_file()
-pytestmark = [pytest.mark.skipif(not PRESENT, reason=study_data.REASON), pytest.mark.xdist_group("reproduction")]
+pytestmark = pytest.mark.skipif(not PRESENT, reason=study_data.REASON)
 EXPECTED = study_data.expected() if PRESENT else {"runs": {}}
 RUNS = sorted(EXPECTED["runs"])
 VECTORS = {"published": "theta_published_si", "study_initial": "theta_study_initial_si"}

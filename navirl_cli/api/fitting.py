@@ -106,8 +106,8 @@ def fit(
         profile: Parameters whose profile likelihood is computed, with its 95 % interval.
         cross_validate: "participant": predict each participant from the others.
         seed: Seed of the bootstrap.
-        workers: Number of processes for bootstrap and cross-validation, in place of threads of this process; faster.
-            Use it under ``if __name__ == "__main__":``.
+        workers: Number of processes for bootstrap, cross-validation, and sums over many scenes, in place of threads of
+            this process; faster. Use it under ``if __name__ == "__main__":``.
         cluster: Address of a running Dask scheduler that distributes them.
         executor: Any other executor that does so.
 
@@ -140,14 +140,14 @@ def fit(
     earlier = None if prior is None else prior_in(prior, person)
     start = _start(terms, init, earlier, selected.demonstrations)
     questions.check(selected.evidence, start)
-    before = None if earlier is None else earlier.as_prior(person)
-    found = fit_reward(selected.evidence, start, weight, prior=before, method=chosen(Method, method, "method"))
-    effect = reach_effect(selected.demonstrations, found, which, reach_m)
-    others, whole = None if earlier is None else earlier.others, which is Steps.ALL
+    evidence, how = selected.evidence, chosen(Method, method, "method")
+    old = None if earlier is None else earlier.as_prior(person)
     with executor_of(executor, workers, cluster) as where:
-        found, analyses, lost = answers(
-            selected.evidence, found, questions, others=others, whole_paths=whole, executor=where
-        )
+        with evidence.kept_by(where) as kept:
+            found = fit_reward(kept, start, weight, prior=old, method=how)
+        effect = reach_effect(selected.demonstrations, found, which, reach_m, evidence, where)
+        others, whole = None if earlier is None else earlier.others, which is Steps.ALL
+        found, analyses, lost = answers(evidence, found, questions, others=others, whole_paths=whole, executor=where)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect

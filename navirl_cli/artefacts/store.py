@@ -1,9 +1,11 @@
 """JSON files with a version. They are checked against their schema when they are read."""
 
+import gc
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -27,6 +29,18 @@ _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 _MCAP = b"\x89MCAP"
 
 
+@contextmanager
+def no_garbage() -> Iterator[None]:
+    """No search for garbage in the block: large contents hold none, and each search would walk through all of them."""
+    searching = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searching:
+            gc.enable()
+
+
 def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: bool) -> None:
     """Write an artefact.
 
@@ -43,6 +57,7 @@ def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: 
         temporary.write_bytes(as_bytes(artefact, content))
 
 
+@no_garbage()
 def as_bytes(artefact: str, content: Mapping[str, Any]) -> bytes:
     """The bytes of an artefact's file; arguments as of :func:`write_json`."""
     document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
@@ -87,6 +102,7 @@ def read_any(path: Path) -> tuple[str, dict[str, Any]]:
     return kind, _checked(document, path, kind)
 
 
+@no_garbage()
 def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
     """The content of a JSON file; arguments as of :func:`read_json`.
 

@@ -117,7 +117,7 @@ from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
         type=Choice([kind.value for kind in ASKED]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
         f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
-        "wald; wald with a term of turns, where profiles take minutes.",
+        "wald.",
     ),
     click.option(
         "--bootstrap",
@@ -197,9 +197,11 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
-    plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
-    effect = reach_effect(chosen, plain, Steps(steps), reach)
+    prior = None if earlier is None else earlier.as_prior(person)
     with workers_of(workers, cluster) as executor:
+        with evidence.kept_by(executor) as kept:
+            plain = _learn(kept, start, prior, l2, Method(method))
+        effect = reach_effect(chosen, plain, Steps(steps), reach, evidence, executor)
         whole = Steps(steps) is Steps.ALL
         others = None if earlier is None else earlier.others
         found, analyses, lost = answers(

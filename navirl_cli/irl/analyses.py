@@ -181,21 +181,23 @@ def answers(
     lost: list[str] = []
     drawn = validation = None
     followed = []
-    measured, bias = _measured(evidence, found, questions, bars, lost), None
-    if questions.correct_bias:
-        with _kept(lost):
-            found = corrected(evidence, found)
-        measured = tuple(one.moved(found) for one in measured)
-    elif whole_paths:
-        bias = expected_bias(evidence, found)
+    bias = None
+    with evidence.kept_by(executor) as kept:
+        measured = _measured(kept, found, questions, bars, lost)
+        if questions.correct_bias:
+            with _kept(lost):
+                found = corrected(kept, found)
+            measured = tuple(one.moved(found) for one in measured)
+        elif whole_paths:
+            bias = expected_bias(kept, found)
     if found.status is Status.CONVERGED and measured and measured[0].is_open:
         found = replace(found, status=Status.OPEN_INTERVAL)
     if questions.bootstrap:
         with _kept(lost), bars("bootstrap", questions.bootstrap) as update:
             drawn = bootstrap(evidence, found, questions.bootstrap, questions.seed, executor=executor, progress=update)
     for name in dict.fromkeys(questions.profiles):
-        with _kept(lost), bars("profile", None) as update:
-            followed.append(profile(evidence, found, name, progress=update))
+        with _kept(lost), bars("profile", None) as update, evidence.kept_by(executor) as kept:
+            followed.append(profile(kept, found, name, progress=update))
     if questions.cross_validate:
         with _kept(lost), bars("cross-validation", len(evidence.people)) as update:
             validation = cross_validate(evidence, found.initial, found.l2, executor=executor, progress=update)
