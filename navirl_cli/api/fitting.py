@@ -147,8 +147,7 @@ def fit(
         with evidence.kept_by(where) as kept:
             found = fit_reward(kept, start, weight, prior=old, method=how)
         effect = reach_effect(selected.demonstrations, found, which, reach_m, evidence, where)
-        whole = which is Steps.ALL
-        others = None if earlier is None else earlier.others
+        others, whole = None if earlier is None else earlier.others, which is Steps.ALL
         found, analyses, lost = answers(evidence, found, questions, others=others, whole_paths=whole, executor=where)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
