@@ -30,7 +30,7 @@ from rows import Row, report
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from dask_scheduler import scheduler
-from fleet_logs import copies
+from fleet_logs import copies, loaded
 from range_server import serving
 
 from navirl_cli.artefacts.many import Folder
@@ -74,13 +74,6 @@ def extraction(logs: list[Path], folder: Path, executor: Executor) -> tuple[floa
 def overhead_ms(executor: Executor) -> float:
     """Time of a task without work, ms."""
     return timed(lambda: list(map_in_order(abs, list(range(1000)), executor)))
-
-
-def loaded(_: int) -> str:
-    """What a worker imports for an extraction."""
-    import navirl_cli.demos.recordings
-
-    return navirl_cli.demos.recordings.__name__
 
 
 def start_s(executor: Executor) -> float:
