@@ -82,9 +82,10 @@ class Twin:
         if number is not None:
             value = value / float(self.objective.scale[number])
         start = self.objective.to_units(self.objective.initial.theta)
+        costly = np.where(np.arange(len(start)) == 0, -5.0, start)  # has a policy, whatever the decay
         found = []
-        for grid in (self.grid, self.grid[::-1]):
-            x = start
+        for x0, grid in ((start, self.grid), (costly, self.grid[::-1])):
+            x = x0
             for decay in grid if number != self.decay else (value,):
                 x = self._climb(np.where(np.arange(len(x)) == self.decay, decay, x), {self.decay}, number, value)
                 found.append(x)
@@ -117,14 +118,15 @@ def test_ends_of_few_paths_against_a_grid_of_decays(terms, seed):
     assert only.kind is Kind.PROFILE, "whatever the states"
     twin = Twin(Objective.of(evidence, found.reward, 0.0, None))
     top = twin.best()
-    for ends, value, parameter in zip(only.ends, found.reward.theta, found.reward.parameters, strict=True):
-        for end, bound in ((ends.lower, parameter.lower), (ends.upper, parameter.upper)):
+    for ends, parameter in zip(only.ends, found.reward.parameters, strict=True):
+        for side, end, bound in ((-1, ends.lower, parameter.lower), (1, ends.upper, parameter.upper)):
             if end is None:
                 assert np.isinf(bound) or twin.best(ends.parameter, bound) - top > -1.95
                 continue
             fall = twin.best(ends.parameter, end) - top
             assert fall == pytest.approx(-1.9207, abs=0.03) or fall < -1e3, "or no policy exists beyond"
-            assert twin.best(ends.parameter, end + 0.3 * (end - value)) - top < -1.9207
+            beyond = min(max(end + side * 0.2 * abs(end), parameter.lower), parameter.upper)
+            assert twin.best(ends.parameter, beyond) - top < -1.9207
 
 
 def test_wald_intervals_are_estimate_and_error(evidence, found):
