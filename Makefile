@@ -16,11 +16,11 @@ test: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -q -n auto --dist loadgroup
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The slow tests too, the installed wheel in an empty environment among them.
 test-all: $(STAMP)
-	$(BIN)/pytest -q -n auto --dist loadgroup -m "slow or not slow"
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder -m "slow or not slow"
 
 test-wheel: $(STAMP)
 	$(BIN)/pytest -q -m slow tests/test_wheel.py
@@ -31,7 +31,7 @@ test-floors:
 	$(PYTHON) -m venv $(FLOORS)
 	$(PYTHON) tests/floors.py > $(FLOORS)/constraints.txt
 	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev]'
-	$(FLOORS)/bin/pytest -q -n auto --dist loadgroup
+	$(FLOORS)/bin/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The site, in docs/_build/html; a warning is an error.
 docs: $(DOCS)

@@ -2,19 +2,21 @@
 
 import json
 import time
+from contextlib import ExitStack
 from threading import Thread
 
 import pytest
 from click.testing import CliRunner
 from dask_scheduler import scheduler
 from fleet_logs import SAMPLES, copies
-from jobs import killed, slow_double
+from jobs import killed, signed, slow_double
 
 from navirl_cli import cluster
 from navirl_cli.cli import cli
 from navirl_cli.cluster import connected
 from navirl_cli.errors import ArgumentError, WorkerLostError
 from navirl_cli.parallel import as_completed, map_in_order
+from navirl_cli.teams import team
 
 distributed = pytest.importorskip("distributed", reason="needs navirl[cluster]")
 
@@ -43,7 +45,7 @@ def test_a_scheduler_that_is_not_there_is_named():
 def address():
     """A scheduler and two workers in threads of this process: the same messages, without the start of processes."""
     with distributed.LocalCluster(
-        2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=None
+        n_workers=2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=None
     ) as own:
         yield own.scheduler_address
 
@@ -53,6 +55,17 @@ def test_logs_give_the_same_demonstrations(address, tmp_path):
     invoked("extract", *SAMPLES[:2], "-o", here, "--workers", 1)
     invoked("extract", *SAMPLES[:2], "-o", there, "--cluster", address)
     assert there.read_bytes() == here.read_bytes()
+
+
+def test_workers_keep_parts_and_answer_in_order(address):
+    with connected(address) as executor:
+        executor._client.wait_for_workers(2)
+        assert executor.size == 2
+        with team(executor, signed, range(7), [1.0] * 7) as ask:
+            assert [part for part, _ in ask((None, None))] == list(range(7))
+            with pytest.raises(ValueError, match="part 3"):
+                ask((3, None))
+            assert ask((None, None)) == ask((None, None))
 
 
 def test_other_versions_are_refused():
@@ -93,3 +106,18 @@ def test_a_killed_worker_changes_nothing_and_a_killing_item_is_lost():
         with pytest.raises(WorkerLostError, match="2 workers ended that worked on this"):
             found.pop(5).result()
         assert [found[number].result() for number in sorted(found)] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+
+
+@pytest.mark.slow
+def test_parts_of_a_killed_worker_are_made_again():
+    with scheduler(workers=3) as (address, workers), connected(address) as executor, ExitStack() as stack:
+        executor._client.wait_for_workers(3)
+        ask = stack.enter_context(team(executor, signed, range(30), [1.0] * 30))
+        before = ask((None, None))
+        assert len({process for _, process in before}) == len(workers)
+        assert ask((None, None)) == before
+        workers[0].kill()
+        workers[0].wait()
+        after = ask((None, None))
+        assert [part for part, _ in after] == list(range(30))
+        assert workers[0].pid not in {process for _, process in after}

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 import urllib.request
 from pathlib import Path
 
@@ -145,6 +146,31 @@ def test_chunks_of_cameras_are_not_fetched(tmp_path):
         assert len(found.columns["x"]) == 400
         assert store.sent < 1.3 * sum(chunks) + (1 << 18)
         assert store.sent < 0.2 * path.stat().st_size
+
+
+def test_a_large_log_is_inspected_by_its_summary(tmp_path):
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=400_000, compression=CompressionType.NONE)
+        writer.start()
+        small = writer.register_channel("/small", "json", writer.register_schema("S", "jsonschema", b"{}"))
+        for n in range(2001):
+            writer.add_message(small, n * 10**7, json.dumps({"x": "a" * 4000}).encode(), n * 10**7)
+        writer.finish()
+    with serving(**{"mixed.mcap": path.read_bytes()}) as store:
+        said = run("inspect", f"{store.url}/mixed.mcap")
+        assert len(store.asked) < 20
+        assert store.sent < 400_000
+        assert "only the summary was read" in said
+        assert re.search(r"/small +S +2001\n", said)
+        assert "20.0 s, 2001 messages" in said
+        brief = json.loads(run("inspect", f"{store.url}/mixed.mcap", "--json"))["logs"][0]
+        assert brief["summary_only"] is True
+        assert brief["demonstrations"] is brief["topics"][0]["gaps"] is None
+        full = json.loads(run("inspect", f"{store.url}/mixed.mcap", "--json", "--check"))["logs"][0]
+        assert full["summary_only"] is False
+        assert full["topics"][0]["gaps"] == 0
+    assert "only the summary" not in run("inspect", path)
 
 
 def test_a_compressed_object_is_read_as_a_whole(tmp_path):

@@ -20,9 +20,6 @@ from navirl_cli.evaluation.meaning import half_distance_m
 from navirl_cli.reports.made import changed_settings, selection_words
 from navirl_cli.reports.reward import in_words
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("report_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
 
 
@@ -93,8 +90,8 @@ def test_it_says_how_it_was_made(page):
     )
     for command in (
         "navirl extract p01.mcap -o demos.json",
-        "navirl fit demos.json --cycle 2 -o reward.json",
-        "navirl report demos.json reward.json --all --samples 100 --seed 0 -o report.html",
+        "navirl fit demos.json --cycle 2 --profile c0 -o reward.json",
+        "navirl report demos.json reward.json --all --samples 100 -o report.html",
     ):
         assert f"<code>{command}</code>" in made
 

@@ -19,9 +19,6 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.study import FIGURES
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("study_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 ANSWERS = "participant,question,modality,answer\n" + "".join(
     f"p{k:02d},The robot was easy to guide,{modality},{1 + (k + shift) % 5}\n"

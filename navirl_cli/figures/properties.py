@@ -19,7 +19,8 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
+from navirl_cli.evaluation.metric import Metric, Values
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
 #: Notes below the panels.

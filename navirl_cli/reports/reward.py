@@ -25,7 +25,6 @@ from navirl_cli.reports.evidence import reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
-    cannot_learn,
     correlation_table,
     formula,
     interval_notes,
@@ -34,10 +33,9 @@ from navirl_cli.reports.fit import (
     parameter_table,
     people,
     profile_table,
-    remarks,
     validation_tables,
-    warnings,
 )
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 from navirl_cli.reports.made import Made, made_blocks
 from navirl_cli.reports.persons import person_blocks
 from navirl_cli.reports.pictures import pictures
@@ -64,7 +62,6 @@ def report_of(
     result: Comparison,
     ranked: Ranking,
     figures: Mapping[str, Path],
-    made_from: Sequence[Mapping[str, str]],
     made: Made,
 ) -> Report:
     """Compose the page.
@@ -76,7 +73,6 @@ def report_of(
         result: Metrics.
         ranked: Ranks of the demonstrations among the policy's paths.
         figures: Files by name.
-        made_from: Files and hashes.
         made: How it was made; its seed is that of the intervals.
     """
     notes, seed = repeated(demonstrations), made.seed
@@ -111,7 +107,7 @@ def report_of(
         *([Bullets(tuple(notes))] if notes else []),
         *made_blocks(content, made),
         Heading("Sources"),
-        Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
+        Table((Column("file"), Column("sha256", "SHA-256")), tuple((one.file, one.sha256) for one in made.files)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from navirl_cli import __version__
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Report
-from navirl_cli.errors import counted
+from navirl_cli.errors import Number, counted
 from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.irl.fit import PAPER_L2
@@ -138,7 +138,7 @@ def overview_of(study: Study, context: StudyContext) -> list[Block]:
     blocks: list[Block] = [rewards_table(study), Bullets(tuple(_claims_lines(study.claims)))]
     if context.cells:
         same = sum(same for _, same in context.cells)
-        blocks.append(Paragraph(f"cells as published: {same} of {len(context.cells)} paths"))
+        blocks.append(Paragraph(f"cells as published: {same} of {counted(len(context.cells), 'path')}"))
     return blocks
 
 
@@ -166,7 +166,10 @@ def remarks(demonstrations: Sequence[Demonstration], answers: Iterable[Answer]) 
         lines.append(f"cycle {', '.join(map(str, others))}: shown, but not fitted; only cycles 1 and 2 are fitted")
     unknown = sum(one.cycle is None and one.set is None for one in pushed)
     if unknown:
-        lines.append(f"{unknown} trials of the condition force have neither cycle nor set: they are not fitted")
+        lines.append(
+            f"{unknown} trial{Number(unknown):|s} of the condition force {Number(unknown):has|have} neither "
+            f"cycle nor set: {Number(unknown):it is|they are} not fitted"
+        )
     aside = sorted({one.set for one in pushed if one.set is not None and one.cycle is not None})
     if aside:
         lines.append(
@@ -224,7 +227,7 @@ def _rewards(study: Study) -> list[Block]:
         blocks.append(
             Paragraph(
                 f"The published parameters were learnt from the second cycles of {PUBLISHED_PARTICIPANTS} people. "
-                f"Under them the second cycles of the {here} participants here have a log-likelihood of "
+                f"Under them the second cycles of the {counted(here, 'participant')} here have a log-likelihood of "
                 f"{published:.4f} nats, under the pooled fit {pooled.fit.log_likelihood:.4f} nats: a difference of "
                 f"{gain:+.3f} nats."
             )
@@ -243,7 +246,9 @@ def _logs(context: StudyContext) -> list[Block]:
         other = sorted(name for name, same in context.cells if not same)
         extra = f"; others: {', '.join(other)}" if other else ""
         same = len(context.cells) - len(other)
-        blocks.append(Paragraph(f"Cells equal to those published: **{same} of {len(context.cells)} paths**{extra}."))
+        blocks.append(
+            Paragraph(f"Cells equal to those published: **{same} of {counted(len(context.cells), 'path')}**{extra}.")
+        )
     return [*blocks, Bullets(tuple(context.notes))] if context.notes else blocks
 
 
