@@ -30,7 +30,7 @@ def demos():
 
 @pytest.fixture(scope="module")
 def reward(demos):
-    return navirl.fit(demos, condition="force", cycle=2, profile="sigma_p")
+    return navirl.fit(demos, condition="force", cycle=2, intervals="wald", profile="sigma_p")
 
 
 @pytest.fixture(name="shell")

@@ -92,7 +92,7 @@ def test_fit_evaluate_and_python(run, term):
     assert view.value[tuple(SCENE.lattice.cells[SCENE.start][::-1])] == view.policy.value_by_cell()[SCENE.start]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NavirlWarning)  # some end on a bound
-        again = navirl_cli.fit(demos, terms=reward["terms"])
+        again = navirl_cli.fit(demos, terms=reward["terms"], intervals="wald")
     assert again.reward.theta == pytest.approx(learnt.reward.theta, rel=1e-6)
     assert again.reward.terms == learnt.reward.terms
     path = json.loads(run("plan", f"{term}.json", "--scene", "demos.json", "--json").stdout)["paths"][0]

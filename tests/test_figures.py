@@ -108,7 +108,7 @@ def test_people_and_robot_are_drawn_to_scale_once():
     drawn = draw_paths(one_axes(), ones)
     assert [circle.center for circle in drawn.people] == [(0.0, 0.1), (1.0, -1.0)]
     assert {circle.radius for circle in drawn.people} == {0.25}
-    assert "person (line style of path)" in legend_texts(drawn.axes)
+    assert "person (outlined like its paths)" in legend_texts(drawn.axes)
     (robot,) = drawn.robots
     np.testing.assert_allclose(robot.center, ones[0].xy_m[0])
     assert robot.radius == 0.3

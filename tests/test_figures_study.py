@@ -60,7 +60,7 @@ def test_every_time_is_a_dot_above_its_modality_and_the_axis_starts_at_0():
 def test_medians_are_named_and_visible_beside_the_dots():
     _, drawn = completion({"force": FORCE_S, "joystick": JOYSTICK_S})
     for at, (number, values) in enumerate(zip(drawn.numbers, (FORCE_S, JOYSTICK_S), strict=True)):
-        assert number.get_text() == f"{np.median(values):.3g}"
+        assert number.get_text() == f"{np.median(values):.1f}"
         assert max(drawn.medians[at].get_xdata()) < min(drawn.dots[at].get_xdata())
 
 

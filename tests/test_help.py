@@ -28,6 +28,8 @@ SLOW = {
     "plan reward.json --scene demos.json:p01/3 --recommend",
     "report demos.json reward.json --samples 50 -o report.html --force",
     "simulate -o simulated",
+    "simulate --participants 1 --seed 7 -o other",
+    "fit demos.json --cycle 2 --terms length,deviation,length-space -o reward.json",
     "models demos.json --condition force --cycle 2",
     "report demos.json reward.json -o report.html",
     "study demos.json --samples 100 -o study",

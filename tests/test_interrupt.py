@@ -44,6 +44,14 @@ def read(terminal):
         return b""
 
 
+@pytest.fixture(autouse=True)
+def heeded():
+    """Commands begin with Ctrl-C in force, also where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture(scope="module")
 def demos(tmp_path_factory):
     """Demonstrations of a sample log."""

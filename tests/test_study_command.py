@@ -57,6 +57,20 @@ def test_all_is_written_and_no_more(written):
     assert {str(path.relative_to(out)) for path in out.rglob("*")} == expected
 
 
+def test_the_page_has_every_figure_for_dark_and_for_narrow_screens(written):
+    page = (written[0] / "report.html").read_text()
+    pictures = re.findall(r"<picture>.*?</picture>", page, re.DOTALL)
+    assert len(pictures) == len(FIGURES) - 1  # the sample logs hold no obstacle course
+    narrow, dark = "(max-width: 599px)", "(prefers-color-scheme: dark)"
+    for one in pictures:
+        assert re.findall(r'media="([^"]*)"', one) == [
+            f"screen and {narrow} and {dark}",
+            f"screen and {narrow}",
+            f"screen and {dark}",
+        ]
+        assert len(set(re.findall(r"base64,[^\"]*", one))) == 4
+
+
 def test_participants_are_fitted_cycle_by_cycle(summary, demos):
     for name in ("p01", "p02", "p03"):
         own = [one for one in demos if one.participant == name]
@@ -126,7 +140,7 @@ def test_the_report_shows_every_figure(written):
     linked = re.findall(r"!\[.*?\]\((.*?)\)", (out / "report.md").read_text())
     assert sorted(linked) == sorted(f"figures/{path.name}" for path in (out / "figures").glob("*.png"))
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == len(linked)
+    assert page.count("data:image/png;base64,") == 4 * len(linked)  # dark, narrow, and both
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
 
 

@@ -12,7 +12,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, DemonstrationError
 from navirl_cli.files import Input
 from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.fit import warnings
+from navirl_cli.reports.fit_remarks import warnings
 
 PathLike: TypeAlias = str | Path
 #: A learnt reward, or values by the names of the parameters; the other parameters keep their initial values.

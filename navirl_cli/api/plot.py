@@ -23,14 +23,13 @@ from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import Trained, group_of, groups_named
-from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
 from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
-from navirl_cli.figures.properties import bars_of, draw_properties, height_for
+from navirl_cli.figures.properties import bars_of, draw_properties, property_layout
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 
 if TYPE_CHECKING:
@@ -131,8 +130,8 @@ def properties(
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
     rows = bars_of(result.groups, _taught(reward, demonstrations))
-    panels, height_in = len(PAPER_METRICS), height_for(rows, width_in(page))
-    return drawn(lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, panels=panels, height_in=height_in)
+    layout = property_layout(rows, width_in(page))
+    return drawn(lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, **layout)
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":

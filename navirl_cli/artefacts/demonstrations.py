@@ -51,7 +51,12 @@ def demonstrations_document(
 
 
 def settings_document(
-    settings: "ExtractSettings", options: "LoadOptions", map_file: Path | None, trials: Path | None
+    settings: "ExtractSettings",
+    options: "LoadOptions",
+    map_file: Path | None,
+    trials: Path | None,
+    *,
+    join: bool = False,
 ) -> dict[str, Any]:
     """The settings of an extraction.
 
@@ -60,6 +65,7 @@ def settings_document(
         options: The user's choices about the logs.
         map_file: The map in place of the log's.
         trials: The table of labels.
+        join: Whether the logs are one recording.
     """
     from navirl_cli.logs.load import Forces
 
@@ -71,6 +77,8 @@ def settings_document(
         "wrench_frame": options.wrench_frame,
         "force_scale": options.force_scale,
         "wrench": options.forces is not Forces.IGNORED,
+        "strict": options.strict,
+        "join": join,
         "map": None if map_file is None else map_file.name,
         "trials": None if trials is None else trials.name,
     }

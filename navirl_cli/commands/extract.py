@@ -248,7 +248,7 @@ def extract(
         strict=strict,
     )
     labels = None if trials is None else read_labels(trials)
-    said = settings_document(settings, options, map_file, trials)
+    said = settings_document(settings, options, map_file, trials, join=join)
     if output.is_folder:
         folder = Folder(output.path, settings, options, said, list(map(Input.of, files)))
         with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite, nan
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -29,7 +30,7 @@ from navirl_cli.commands.shared import (
     workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
-from navirl_cli.commands.usage import Command, Example, as_options, section
+from navirl_cli.commands.usage import Command, Example, as_options, given_words, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
@@ -44,7 +45,8 @@ from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
-from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
+from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 
 
 @click.command(
@@ -115,7 +117,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         type=Choice([kind.value for kind in ASKED]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
         f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
-        "wald; wald with a term of turns, where profiles take minutes.",
+        "wald.",
     ),
     click.option(
         "--bootstrap",
@@ -209,20 +211,25 @@ def fit(
         found, analyses, lost = answers(
             evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
         )
-    document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
-    )
+    inputs = [Input.of(path) for path in files]
+    document = reward_document(found, chosen, inputs, selected.resolution_m, analyses, steps, effect)
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
+    document["options"] = given_words()
     write_json(output, "reward", document, force=force)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
+    _show(document, [*notes, *reach_unused(document, reach)], as_json=as_json)
+    finish(lost)
+
+
+def _show(document: dict[str, Any], notes: Sequence[str], *, as_json: bool) -> None:
+    """Print the fit, and below it what a reader should know of it."""
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
-    for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
-    finish(lost)
 
 
 def _learn(evidence: Evidence, start: Reward, prior: Prior | None, l2: float, method: Method) -> Fit:

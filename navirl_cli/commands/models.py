@@ -24,7 +24,7 @@ from navirl_cli.errors import counted
 from navirl_cli.irl.models import MODELS, compare_models, with_paper
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
-from navirl_cli.reports.fit import cannot_learn
+from navirl_cli.reports.fit_remarks import cannot_learn
 from navirl_cli.reports.models import models_document, models_lost, models_remarks, models_report
 
 

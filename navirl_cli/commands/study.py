@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import click
@@ -113,7 +114,7 @@ def study(
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
     _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)
-    with workers_of(workers, cluster) as executor, swapped_folder(output) as folder:
+    with workers_of(workers, cluster) as executor, swapped_folder(output) as folder, TemporaryDirectory() as screens:
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
         demonstrations = given.demonstrations
@@ -138,7 +139,9 @@ def study(
         pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
             here = executor if cluster is None else None  # figures are files of this machine
-            drawn = draw_study(found, pooled, bars, folder / "figures", force=force, progress=update, executor=here)
+            drawn = draw_study(
+                found, pooled, bars, folder / "figures", Path(screens), force=force, progress=update, executor=here
+            )
         problems = [line for one in (*found.participants, found.pooled) for line in one.problems]
         lost = [*given.lost, *problems, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]

@@ -1,7 +1,7 @@
 """Ends of profile-likelihood intervals (Venzon and Moolgavkar 1988, Applied Statistics 37:87)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import inf, isfinite, sqrt
 
 import numpy as np
@@ -12,6 +12,7 @@ from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.newton import Effort, Maximum, Point, maximise, moved
 from navirl_cli.irl.objective import Objective
 from navirl_cli.irl.scan import Scan
+from navirl_cli.irl.stretched import Stretched
 
 #: Tolerance of the fall at an end, as a share of it, and the largest number of values tried for it.
 END_TOLERANCE, END_TRIES = 0.01, 40
@@ -21,6 +22,8 @@ MOST_STEPS = 40
 ENOUGH = 2e-3
 #: Predicted gain at which the climb to the top ends, nats.
 TOP = 1e-4
+#: How far below the best a place on a profile may be, nats: the climbs there are coarse.
+COARSE = 0.05
 #: How often an end is moved on because another branch of the other parameters reaches farther.
 BRANCHES = 5
 #: A climb far from an end ends where it promises less than this share of the distance, in nats.
@@ -33,15 +36,15 @@ GROWTH = 4.0
 
 @dataclass(eq=False)
 class Profiler:
-    """Ends of profile intervals, in units of the parameters' scales."""
+    """Ends of profile intervals; all places by the coordinates of :mod:`navirl_cli.irl.stretched`."""
 
-    objective: Objective
+    objective: Stretched
     top: Point
     free: NDArray[np.bool_]
     #: All places found so far: each shows how far an interval reaches at least.
     seen: list[Point]
-    #: Whether the profile over what enters non-linearly has several peaks, between which the others may jump.
-    branched: bool
+    #: Places on the profiles over what enters non-linearly, by its number and ascending, by the plain parameters.
+    along: dict[int, list[Point]]
     #: Predicted gain at which a climb ends, nats.
     enough: float
 
@@ -57,25 +60,30 @@ class Profiler:
         """
         l2 = 0.0 if found.l2 <= PAPER_L2 else found.l2
         free = found.identified
-        objective = Objective.of(evidence, found.reward, l2, found.prior)
-        top = estimate = objective(objective.to_units(found.reward.theta))
-        if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere; the scan below finds others
-            top = maximise(
-                objective, estimate, objective.bounds, free, effort=Effort(MOST_STEPS, TOP, strides=True)
-            ).best
-        scans = [(j, values) for j, values in objective.scans() if free[j]]
-        seen = [top, estimate]
-        branched = len(scans) > 1
-        for j, values in scans:
-            along = Scan(objective, objective.bounds, free, None, [_known(top)], most, found.scanned).follow(j, values)
-            seen += along
-            branched |= _has_several_peaks(along, j)
-        best_seen = max(seen, key=lambda point: point.value)
-        return Profiler(objective, best_seen, free, seen, branched, ENOUGH * least)
+        plain = Objective.of(evidence, found.reward, l2, found.prior)
+        objective = Stretched.of(plain)
+        top = estimate = objective.point(plain(plain.to_units(found.reward.theta)))
+
+        def climbed(start: Point) -> Point:
+            return maximise(objective, start, objective.bounds, free, effort=Effort(MOST_STEPS, TOP, strides=True)).best
+
+        if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere
+            top = climbed(estimate)
+        known = [_known(objective.place(top))]
+        along = {
+            j: Scan(plain, plain.bounds, free, None, known, most, found.scanned).follow(j, values)
+            for j, values in plain.scans()
+            if free[j]
+        }
+        seen = [top, estimate, *(objective.point(place) for places in along.values() for place in places)]
+        best = max(seen, key=lambda point: point.value)
+        if best is not top:  # it is on another branch, or much farther along a ridge
+            best = climbed(best)
+        return Profiler(objective, best, free, [best, *seen], along, ENOUGH * least)
 
     def ends(self, j: int, side: int, falls: list[float]) -> list[float | None]:
         """The ends on one side of the intervals of parameter j at several falls, in its unit; None where open."""
-        scale = float(self.objective.scale[j])
+        scale = float(self.objective.objective.scale[j])
         ends: dict[float, float | None] = {}
         for fall in sorted(set(falls)):
             end = self._end(j, side, fall)
@@ -83,12 +91,17 @@ class Profiler:
         return [ends[fall] for fall in falls]
 
     def _extrapolated(self, j: int, side: int, fall: float, end: Point) -> float:
-        """The end by one more step of the quadratic model, which needs no evaluation; never beyond the bound."""
-        step, here = self._model_step(j, fall, end, side), float(end.x[j])
+        """The plain end by one more step of the quadratic model, which needs no evaluation; never beyond the bound."""
+        step, here = self._model_step(j, fall, end, side), self._plain(j, float(end.x[j]))
         low, high = (float(bound[j]) for bound in self.objective.bounds)
-        if step is None or abs(step) > EXTRAPOLATED * abs(here) or not low < here + step < high:
+        if step is None or not low < end.x[j] + step < high:
             return here
-        return here + step
+        there = self._plain(j, float(end.x[j]) + step)
+        return there if abs(there - here) <= EXTRAPOLATED * abs(here) else here
+
+    def _plain(self, j: int, value: float) -> float:
+        """The plain parameter j, in units of its scale."""
+        return float(self.objective.plain(np.where(np.arange(len(self.free)) == j, value, self.top.x))[j])
 
     def _end(self, j: int, side: int, fall: float) -> Point | None:
         """The last place on the profile, to one side, that has not fallen by more than a given amount."""
@@ -135,7 +148,8 @@ class Profiler:
         block = np.ix_(self.free, self.free)
         variance = float(np.linalg.pinv(-self.top.hessian[block])[np.flatnonzero(self.free).tolist().index(j)].max())
         span = sqrt(2 * fall * variance) if variance > 0 else inf
-        return min(span, 0.5 * max(abs(float(inside.x[j])), 0.1))
+        x = self.objective.plain(inside.x)
+        return min(span, 0.5 * max(abs(float(x[j])), 0.1) / float(self.objective.slopes(x)[0][j]))
 
     def _share(self, j: int, fall: float, inside: Point, here: Point, outside: Point | None, ahead: float) -> float:
         """Where the end is expected, as a share of the way ahead from the place inside."""
@@ -175,8 +189,9 @@ class Profiler:
             begin = self.objective(np.where(np.arange(len(guess.x)) == j, value, guess.x))
         if not isfinite(begin.value):
             return begin
-        away = abs(self._left(begin, fall))
-        for enough in (max(self.enough, SIDE * away), self.enough):
+        left, enough = self._left(begin, fall), inf
+        while enough > self.enough:
+            enough = max(self.enough, min(SIDE * abs(left), 0.5 * enough))
             effort = Effort(MOST_STEPS, enough, strides=True)
             begin = maximise(self.objective, begin, self.objective.bounds, others, effort=effort).best
             left = self._left(begin, fall)
@@ -192,22 +207,56 @@ class Profiler:
     def _other_branch(self, j: int, fall: float, end: Point) -> Point | None:
         """A place at the end's value that lies well inside, with other values of what enters non-linearly."""
         others = self.free & (np.arange(len(end.x)) != j)
-        scans = [(i, values) for i, values in self.objective.scans() if others[i]]
-        if not scans or not self.branched:
-            return None
-        search = Scan(self.objective, self.objective.bounds, others, None, [_known(end)])
-        best = max((place for i, values in scans for place in search.follow(i, values)), key=lambda one: one.value)
-        return best if best.value > self.top.value - fall * (1 - 2 * END_TOLERANCE) else None
+        plain, place, higher = self.objective.objective, self.objective.place(end), 2 * END_TOLERANCE * fall
+        found: list[Point] = []
+        for i, values in plain.scans():
+            near = self._promising(i, values, j, place) if others[i] else []
+            if near:
+                starts = [self._shifted(one, i, j, float(place.x[j])) for one in self.along[i]]
+                search = Scan(plain, plain.bounds, others, None, [_known(place)], -higher, starts)
+                found += search.follow(i, near)
+        best = max(found, key=lambda one: one.value, default=place)
+        return self.objective.point(best) if best.value > place.value + higher else None
+
+    def _shifted(self, place: Point, i: int, j: int, value: float) -> Point:
+        """A place on the profile over variable i, and where the others are expected at a value of variable j."""
+        others = self.free & ~np.isin(np.arange(len(place.x)), (i, j))
+        x = moved(place, j, value - float(place.x[j]), self.objective.objective.bounds, others)
+        return Point(x, place.value, place.gradient, place.hessian)
+
+    def _promising(self, i: int, values: Sequence[float], j: int, end: Point) -> list[float]:
+        """Values of variable i at which the likelihood may be higher at an end of variable j, and their neighbours.
+
+        With variable i held the likelihood is concave in the others. From the best place there it falls by at least
+        d - ln(1 + d) where its quadratic model falls by d^2/2 (Nesterov 2004, Thm. 4.1.7).
+        """
+        others = self.free & ~np.isin(np.arange(len(end.x)), (i, j))
+        high = [
+            float(place.x[i])
+            for place in self.along[i]
+            if place.value - _least_fall(place, j, float(end.x[j] - place.x[j]), others) > end.value - COARSE
+        ]
+        ascending = np.array(values)
+        cells = np.searchsorted(ascending, [*high, float(end.x[i])])
+        if len(set(cells.tolist())) < 2:
+            return []  # a branch between the same two values as the end is none that a scan could find
+        kept = np.zeros(len(values), dtype=bool)
+        for value in high:
+            low, up = int(np.searchsorted(ascending, value)), int(np.searchsorted(ascending, value, "right"))
+            kept[max(low - 1, 0) : up + 1] = True
+        near: list[float] = ascending[kept].tolist()
+        return near
 
     def _within(self, place: Point, fall: float) -> bool:
         return self._left(place, fall) >= 0
 
 
-def _has_several_peaks(along: list[Point], j: int) -> bool:
-    """Whether the values along a profile fall and rise again."""
-    values = [point.value for point in sorted(along, key=lambda point: float(point.x[j]))]
-    steps = [later - earlier for earlier, later in pairwise(values) if abs(later - earlier) > END_TOLERANCE]
-    return any(before < 0 < after for before, after in pairwise(steps))
+def _least_fall(place: Point, j: int, step: float, others: NDArray[np.bool_]) -> float:
+    """The least fall of a self-concordant function from its best place by others, at a step of variable j."""
+    inverse = np.linalg.pinv(-place.hessian[np.ix_(others, others)], hermitian=True)
+    information = -float(place.hessian[j, j]) - float(place.hessian[j, others] @ inverse @ place.hessian[others, j])
+    d = abs(step) * sqrt(max(information, 0.0))
+    return d - float(np.log1p(d)) + max(-float(place.gradient[j]) * step, 0.0)
 
 
 def _known(point: Point) -> Maximum:

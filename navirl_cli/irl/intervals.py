@@ -96,13 +96,7 @@ class Intervals:
 
 
 def default_kind(found: Fit) -> Kind:
-    """Profiles where there are few demonstrations or where a standard error leaves the admissible range.
-
-    With states of turns a profile takes minutes, so that standard errors stand there; their ends beyond a
-    bound are open.
-    """
-    if found.reward.about_turns:
-        return Kind.WALD
+    """Profiles where there are few demonstrations or where a standard error leaves the admissible range."""
     beyond = any(one.is_open for errors in _errors(found) for one in _wald(found, errors).ends)
     few = found.demonstrations < FEW_DEMONSTRATIONS
     return Kind.PROFILE if few or beyond or found.on_bound.any() else Kind.WALD

@@ -8,7 +8,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.documents.tables import Cell, Column, Format, Table, is_missing, written
 from navirl_cli.errors import ArgumentError, MissingPackageError
 from navirl_cli.evaluation.compare import Comparison
-from navirl_cli.evaluation.metrics import Metric
+from navirl_cli.evaluation.metric import Metric
 from navirl_cli.files import replacing
 
 PER_TRIAL_ENDINGS = (".csv", ".parquet")

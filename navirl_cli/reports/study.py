@@ -6,7 +6,7 @@ from pathlib import Path
 
 from navirl_cli import __version__
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Report
 from navirl_cli.errors import Number, counted
 from navirl_cli.evaluation.compare import DRIVEN
 from navirl_cli.evaluation.groups import GroupMetrics
@@ -14,6 +14,7 @@ from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.reports.evaluation import group_table
 from navirl_cli.reports.fit import formula
+from navirl_cli.reports.pictures import pictures
 from navirl_cli.reports.study_tables import (
     answers_table,
     claims_table,
@@ -82,7 +83,7 @@ class StudyContext:
     notes: Sequence[str]
     #: Published paths, and whether our cells are the same.
     cells: Sequence[tuple[str, bool]]
-    #: Figures drawn, by name.
+    #: Figures drawn, by name; with those for other screens, as :func:`navirl_cli.reports.pictures.pictures` takes them.
     figures: Mapping[str, Path]
     #: Answers to the questionnaire.
     answers: Sequence[Shares]
@@ -109,16 +110,16 @@ def report_of(study: Study, context: StudyContext) -> Report:
         Paragraph(_VERDICTS),
         *_tasks(study, context),
         Heading("Paths"),
-        *_pictures(context, "fig3_paths", "fig5_replays"),
+        *pictures(context.figures, FIGURES, "fig3_paths", "fig5_replays"),
         Heading("Path properties"),
         *_properties(study.groups),
-        *_pictures(context, "fig7_properties"),
+        *pictures(context.figures, FIGURES, "fig7_properties"),
         Heading("Learnt rewards"),
         *_rewards(study),
         Heading("Learnt policies beside the second cycle"),
         closeness_table(study),
         Paragraph(_ON_GRID),
-        *_pictures(context, "fig8_pooled", "fig9_unseen"),
+        *pictures(context.figures, FIGURES, "fig8_pooled", "fig9_unseen"),
         Heading("Logs"),
         *_logs(context),
         Heading("Method"),
@@ -188,18 +189,18 @@ def _claims_lines(claims: Sequence[Claim]) -> Iterator[str]:
         yield f"**{claim.verdict.value}**: {claim.text} ({claim.question}: {numbers}.)"
 
 
-def _pictures(context: StudyContext, *names: str) -> list[Block]:
-    return [Picture(context.figures[name], FIGURES[name]) for name in names if name in context.figures]
-
-
 def _tasks(study: Study, context: StudyContext) -> list[Block]:
     """The obstacle course and the questionnaire, where there are any."""
     blocks: list[Block] = []
     if study.completion_s:
         blocks += [Heading("Obstacle course"), completion_table(study.completion_s)]
-        blocks += _pictures(context, "fig2_completion_times")
+        blocks += pictures(context.figures, FIGURES, "fig2_completion_times")
     if "fig4_answers" in context.figures:
-        blocks += [Heading("Questionnaire"), answers_table(context.answers), *_pictures(context, "fig4_answers")]
+        blocks += [
+            Heading("Questionnaire"),
+            answers_table(context.answers),
+            *pictures(context.figures, FIGURES, "fig4_answers"),
+        ]
     return blocks
 
 

@@ -93,8 +93,7 @@ def properties(
     Points are means with their 95 % intervals, from participants' means, and with standard deviations as thin lines.
     """
     from navirl_cli.evaluation.groups import group_of
-    from navirl_cli.evaluation.metrics import PAPER_METRICS
-    from navirl_cli.figures.properties import bars_of, draw_properties, height_for
+    from navirl_cli.figures.properties import bars_of, draw_properties, property_layout
 
     refuse_unused("--reward", "person", "samples", "seed", "everything", used=reward is not None)
     everyone = demonstrations_in(*demos)
@@ -103,11 +102,7 @@ def properties(
     result = _compared(demonstrations, learnt, samples, seed)
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     bars = bars_of(result.groups, taught)
-    page.draw(
-        lambda axes: draw_properties(axes, bars, as_bars=as_bars),
-        height_in=height_for(bars, page.width_in),
-        panels=len(PAPER_METRICS),
-    )
+    page.draw(lambda axes: draw_properties(axes, bars, as_bars=as_bars), **property_layout(bars, page.width_in))
     finish(result.notes)
 
 
