@@ -30,7 +30,7 @@ test-floors:
 	rm -rf $(FLOORS)
 	$(PYTHON) -m venv $(FLOORS)
 	$(PYTHON) tests/floors.py > $(FLOORS)/constraints.txt
-	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev]'
+	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev,view]'
 	$(FLOORS)/bin/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The site, in docs/_build/html; a warning is an error.
