@@ -3,6 +3,7 @@
 import json
 import time
 from contextlib import ExitStack
+from importlib.util import find_spec
 from threading import Thread
 
 import numpy as np
@@ -25,7 +26,7 @@ from navirl_cli.irl.series import InfinitePartitionError
 from navirl_cli.parallel import as_completed, map_in_order
 from navirl_cli.teams import team
 
-distributed = pytest.importorskip("distributed", reason="needs navirl[cluster]")
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="needs navirl[cluster]")
 
 
 def invoked(*words):
@@ -51,6 +52,8 @@ def test_a_scheduler_that_is_not_there_is_named():
 @pytest.fixture(scope="module")
 def address():
     """A scheduler and two workers in threads of this process: the same messages, without the start of processes."""
+    import distributed
+
     with distributed.LocalCluster(
         n_workers=2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=None
     ) as own:

@@ -5,6 +5,7 @@ import os
 import pickle
 import re
 import urllib.request
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ from navirl_cli.logs.container.remote_file import RemoteFile, _joined
 from navirl_cli.logs.messages.reader import read
 from navirl_cli.remote import Remote, _store, path_of
 
-pytest.importorskip("obstore", reason="needs navirl[remote]")
+#: Not imported before these tests run: beside obstore, processes do not begin as copies, and import everything anew.
+pytestmark = pytest.mark.skipif(find_spec("obstore") is None, reason="needs navirl[remote]")
 LOG = SAMPLES[0].read_bytes()
 
 
