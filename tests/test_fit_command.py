@@ -215,7 +215,7 @@ def test_a_prior_is_an_earlier_reward_with_its_covariance(navirl, files):
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (("--prior", "{}/reward.json", "--cross-validate", "participant"), 2, "--cross-validate and --prior exclude"),
+        (("--prior", "{}/reward.json", "--cross-validate", "participant"), 2, "leave out --prior, or --cross-validate"),
         (("--profile", "nonsense"), 1, "navirl: --profile: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'n"),
         (("--bootstrap", "1"), 2, "Invalid value for '--bootstrap': 1 is not in the range"),
         (("--cross-validate", "trial"), 2, "for '--cross-validate': expected 'participant', found 'trial'"),

@@ -116,7 +116,7 @@ class TestCommand:
         log = write_run(tmp_path / "run.mcap", Run(session={"laid_out_m_s": "0.4"}))
         result = navirl("extract", log, "-o", "demos.json", "--json")
         assert json.loads(result.stdout)["trials"][0]["duration_s"] is None
-        assert "its positions came without times and were laid out at 0.4 m/s" in result.stderr
+        assert "the positions came without times and were laid out at 0.4 m/s" in result.stderr
 
     def test_notes_of_several_logs_are_put_together(self, navirl, tmp_path):
         logs = [

@@ -17,6 +17,7 @@ from navirl_cli.api.arguments import (
 )
 from navirl_cli.api.given import (
     AnyReward,
+    Demos,
     PathLike,
     demonstrations_in,
     files_behind,
@@ -42,7 +43,7 @@ from navirl_cli.reports.per_trial import check_per_trial, write_per_trial
 
 
 def evaluate(
-    demos: PathLike | Sequence[Demonstration] | Mapping[str, PathLike | Sequence[Demonstration]],
+    demos: Demos | Mapping[str, Demos],
     reward: PathLike | AnyReward | Mapping[str, PathLike | AnyReward] | None = None,
     *,
     person: str | None = None,
@@ -68,7 +69,7 @@ def evaluate(
     """Measure demonstrated, learnt and baseline paths, as ``navirl evaluate``.
 
     Args:
-        demos: Demonstrations, or their file; or several by name, whose groups of the same name are compared.
+        demos: Demonstrations, or their files; or several by name, whose groups of the same name are compared.
         reward: A reward, its file, values by name of parameter; or several rewards by name.
         person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
         metrics: Names of metrics, or "all"; the paper's three by default.

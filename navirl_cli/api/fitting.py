@@ -13,6 +13,7 @@ from navirl_cli.api.arguments import (
 )
 from navirl_cli.api.given import (
     AnyReward,
+    Demos,
     PathLike,
     demonstrations_in,
     files_behind,
@@ -31,7 +32,7 @@ from navirl_cli.irl.analyses import Pool, Questions, answers
 from navirl_cli.irl.fit import PAPER_L2, Method
 from navirl_cli.irl.fit import fit as fit_reward
 from navirl_cli.irl.intervals import ASKED, Kind
-from navirl_cli.irl.reward import starting
+from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Term
@@ -41,7 +42,7 @@ from navirl_cli.reports.fit_remarks import warnings as fit_warnings
 
 
 def fit(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     *,
     terms: str | Sequence[str | Term] = (),
     init: PathLike | AnyReward | None = None,
@@ -74,7 +75,7 @@ def fit(
     A fit that did not converge and an analysis that failed give a warning (:class:`~navirl_cli.errors.NavirlWarning`).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         terms: Terms whose sum the reward is: names, separated by commas or in a list, files as "my_term.py:MyTerm", or
             terms themselves; "length,deviation,personal-space" by default.
         init: Initial values: a reward, its file, or values by name.
@@ -123,21 +124,11 @@ def fit(
         >>> reward["c0"]  # per metre
         -49.02...
     """
-    words = option_words({name: value for name, value in locals().items() if name != "demos"}, fit.__kwdefaults__ or {})
-    questions = Questions(
-        correct_bias,
-        None if bootstrap is None else int(within("bootstrap", bootstrap, 2, 100_000)),
-        texts(profile),
-        cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
-        seed,
-        None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
-        chosen(Pool, pool, "pool"),
-        person,
-    )
+    given = {name: value for name, value in locals().items() if name != "demos"}
+    questions = _questions(correct_bias, bootstrap, texts(profile), cross_validate, seed, intervals, pool, person)
     which, weight = chosen(Steps, steps, "steps"), within("l2", l2, 0, 1e6)
     questions.check_arguments(which, prior=prior is not None, l2=weight)
-    demos = demonstrations_in(demos)
-    subset = subset_in(condition, cycle, set, participant, trial)
+    demos, subset = demonstrations_in(demos), subset_in(condition, cycle, set, participant, trial)
     reach_m = None if reach is None else within("reach", reach, 0.1, 100)
     selected = select(
         of_participant(demos, person),
@@ -148,10 +139,7 @@ def fit(
         reach_m=reach_m,
     )
     earlier = None if prior is None else prior_in(prior, person)
-    if earlier is not None:
-        check_cells(earlier, selected.demonstrations, "prior")
-    given = init if init is None or isinstance(init, Mapping) else reward_in(init)
-    start = starting(terms_in(terms), given, None if earlier is None else earlier.reward)
+    start = _start(terms, init, earlier, selected.demonstrations)
     questions.check(selected.evidence, start)
     evidence, how = selected.evidence, chosen(Method, method, "method")
     old = None if earlier is None else earlier.as_prior(person)
@@ -159,25 +147,59 @@ def fit(
         with evidence.kept_by(where) as kept:
             found = fit_reward(kept, start, weight, prior=old, method=how)
         effect = reach_effect(selected.demonstrations, found, which, reach_m, evidence, where)
-        whole = which is Steps.ALL
-        others = None if earlier is None else earlier.others
+        others, whole = None if earlier is None else earlier.others, which is Steps.ALL
         found, analyses, lost = answers(evidence, found, questions, others=others, whole_paths=whole, executor=where)
     inputs = [*sources_behind(demos), *files_behind(init), *files_behind(prior)]
     document = reward_document(
         found, selected.demonstrations, inputs, selected.resolution_m, analyses, which.value, effect
     )
-    document["options"] = words
+    document["options"] = option_words(given, fit.__kwdefaults__ or {})
     if person is not None and earlier is not None:
         document |= whose(person, earlier.participants)
-    notes = (
-        *cannot_learn(selected.demonstrations),
-        *remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos),
-        *reach_unused(document, reach_m),
-        *fit_warnings(document),
-    )
-    reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}
-    ended = [] if reached else [f"fit: {found.status.value}: {found.status.advice}"]
-    warn([*ended, *lost])
+    said = remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos)
+    notes = (*cannot_learn(selected.demonstrations), *said, *reach_unused(document, reach_m), *fit_warnings(document))
+    warn([*_ended(found.status), *lost])
     return FittedReward.of(
         learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses
     )
+
+
+def _questions(
+    correct_bias: bool,
+    bootstrap: int | None,
+    profiles: tuple[str, ...],
+    cross_validate: str | None,
+    seed: int,
+    intervals: str | None,
+    pool: str,
+    person: str | None,
+) -> Questions:
+    """The analyses that are asked for, arguments as of :func:`fit`."""
+    return Questions(
+        correct_bias,
+        None if bootstrap is None else int(within("bootstrap", bootstrap, 2, 100_000)),
+        profiles,
+        cross_validate is not None and bool(one_of(("participant",), cross_validate, "cross_validate")),
+        seed,
+        None if intervals is None else Kind(one_of([kind.value for kind in ASKED], intervals, "intervals")),
+        chosen(Pool, pool, "pool"),
+        person,
+    )
+
+
+def _start(
+    terms: str | Sequence[str | Term],
+    init: PathLike | AnyReward | None,
+    earlier: LearntReward | None,
+    demonstrations: Sequence[Demonstration],
+) -> Reward:
+    """The reward at which the fit starts; a prior is checked against the cells of the demonstrations."""
+    if earlier is not None:
+        check_cells(earlier, demonstrations, "prior")
+    given = init if init is None or isinstance(init, Mapping) else reward_in(init)
+    return starting(terms_in(terms), given, None if earlier is None else earlier.reward)
+
+
+def _ended(status: Status) -> list[str]:
+    """What to say of a fit that is not at a maximum."""
+    return [] if status in {Status.CONVERGED, Status.OPEN_INTERVAL} else [f"fit: {status.value}: {status.advice}"]

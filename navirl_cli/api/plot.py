@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from navirl_cli.api.arguments import subset_in, texts, within
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
+from navirl_cli.api.given import AnyReward, Demos, PathLike, demonstrations_in, learnt_in, of_one, reward_in
 from navirl_cli.api.maps import actions, policy, reward, value
 from navirl_cli.api.page import PageOptions, drawn, own, width_in
 from navirl_cli.artefacts.rewards import LearntReward
@@ -39,7 +39,7 @@ __all__ = ["actions", "convergence", "forces", "paths", "policy", "profile", "pr
 
 
 def paths(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     *,
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
@@ -54,7 +54,7 @@ def paths(
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         condition: Only trials of these conditions, as of :func:`navirl_cli.fit`; so are cycle, set, participant and
             trial.
         cycle: Only trials of these cycles.
@@ -81,7 +81,7 @@ def paths(
 
 
 def properties(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward | None = None,
     *,
     person: str | None = None,
@@ -99,7 +99,7 @@ def properties(
     """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
@@ -152,7 +152,7 @@ def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[P
 
 
 def ranks(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward,
     *,
     person: str | None = None,
@@ -170,7 +170,7 @@ def ranks(
     """Draw the ranks of demonstrations among paths of the policy by group: uniform if the policy is right.
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: A reward, its file, or values by name of parameter.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.

@@ -25,6 +25,9 @@ KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
+#: The first bytes of a log.
+_MCAP = b"\x89MCAP"
+
 
 @contextmanager
 def no_garbage() -> Iterator[None]:
@@ -113,9 +116,11 @@ def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
         return _parsed(data.decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        found = "an MCAP log; navirl extract makes demonstrations of it" if data.startswith(_MCAP) else "no text"
+        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found {found}") from error
     except (ValueError, RecursionError) as error:
-        hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
-        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
+        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error})") from error
 
 
 def _checked(document: Any, path: Path, artefact: str) -> dict[str, Any]:

@@ -53,7 +53,7 @@ from navirl_cli.reports.models import models_document, models_lost, models_remar
 @workers_options
 @section("Output", json_option)
 def models(
-    demos: Path,
+    demos: tuple[Path, ...],
     choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
@@ -72,7 +72,7 @@ def models(
     if reach is not None and Steps(steps) is not Steps.REACHABLE:
         raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
-        demonstrations_in(demos),
+        demonstrations_in(*demos),
         choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,

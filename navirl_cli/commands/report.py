@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.artefacts.demonstrations import settings_document
-from navirl_cli.artefacts.manifest import inputs_of, manifest_path, read_manifest
+from navirl_cli.artefacts.joined import read_content
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
-from navirl_cli.artefacts.store import read_json
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
@@ -31,7 +30,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.documents.document import Block, Bullets
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.files import MANIFEST, Input, replacing
+from navirl_cli.files import Input, replacing
 from navirl_cli.logs.load import LoadOptions
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ if TYPE_CHECKING:
 @section("Learnt paths", person_option, samples_option(), seed_option)
 @section("Output", output_option("Page to write: .html.", ".html"), force_option)
 def report(
-    demos: Path,
+    demos: tuple[Path, ...],
     reward: Path,
     choosing: Choosing,
     person: str | None,
@@ -66,8 +65,8 @@ def report(
     paths, how typical the demonstrations are of the policy, figures, trials, and the files with their hashes. It has a
     light and a dark style, for screens, phones and paper; tables can be sorted, figures enlarged.
     """
-    check_output(output, [demos, reward], force=force)
-    everyone = demonstrations_in(demos)
+    check_output(output, [*demos, reward], force=force)
+    everyone = demonstrations_in(*demos)
     content = reward_content(reward, person)
     learnt = learnt_of(content, str(reward))
     check_cells(learnt, everyone, str(reward))
@@ -118,20 +117,17 @@ def _page(
         return to_html(replace(found, blocks=tuple(map(_with_options, found.blocks)))), result.notes
 
 
-def _made(demos: Path, reward: Path, everyone: Sequence[Demonstration], seed: int) -> "Made":
+def _made(demos: Sequence[Path], reward: Path, everyone: Sequence[Demonstration], seed: int) -> "Made":
     """The files of the page, and the options by which they were made."""
     from navirl_cli.reports.made import Made
 
-    several = manifest_path(demos).name == MANIFEST
-    extracted = read_json(manifest_path(demos), "manifest") if several else read_json(demos, "demonstrations")
-    inputs = inputs_of(read_manifest(demos)) if several else [Input(**one) for one in extracted["inputs"]]
-    usual = settings_document(ExtractSettings(), LoadOptions(), None, None)
+    extracted, _ = read_content(demos)
     return Made(
-        demos=Input.of(demos),
+        demos=tuple(map(Input.of, demos)),
         reward=Input.of(reward),
-        inputs=inputs,
+        inputs=[Input(**one) for one in extracted["inputs"]],
         settings=extracted["settings"],
-        usual=usual,
+        usual=settings_document(ExtractSettings(), LoadOptions(), None, None),
         options=tuple(given_words()),
         seed=seed,
         everyone=everyone,

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.artefacts.joined import read_joined
 from navirl_cli.commands import completion
 from navirl_cli.commands.types import Choice, Count, FilePath, LogPath, OutputPath, Point, RoleTopic
 from navirl_cli.commands.usage import Function, as_options, is_quiet, is_verbose, section
@@ -33,7 +33,8 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON i
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
-demos_argument = click.argument("demos", type=FilePath)
+#: Files of demonstrations, and folders with a manifest.
+demos_argument = click.argument("demos", metavar="DEMOS...", nargs=-1, required=True, type=FilePath)
 person_option = click.option(
     "--person",
     metavar="NAME",
@@ -100,16 +101,17 @@ def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ..
     return chosen
 
 
-def demonstrations_in(path: Path) -> list[Demonstration]:
-    """The demonstrations of a file; an error if it holds none.
+def demonstrations_in(*paths: Path) -> list[Demonstration]:
+    """The demonstrations of files and folders; an error if they hold none.
 
     Raises:
-        DemonstrationError: It holds none.
-        ArtefactError: The file is not a demonstrations file.
+        DemonstrationError: They hold none, or two have the same id.
+        ArtefactError: One is not a demonstrations file.
+        ArgumentError: One is named twice.
     """
-    demonstrations = read_demonstrations(path)
+    demonstrations = read_joined(paths)
     if not demonstrations:
-        raise DemonstrationError(f"{path}: holds no demonstrations")
+        raise DemonstrationError(f"{', '.join(map(str, paths))}: holds no demonstrations")
     return demonstrations
 
 
@@ -270,7 +272,7 @@ def progress_bar(
 
 
 def _by_lines(label: str, length: int | None, line_every: int | None, every_s: float) -> Callable[[int, str], None]:
-    """Progress as lines after so many steps, and after so much time, with an estimate of the time that is left."""
+    """Progress as lines after so many steps, and after so much time, with an estimate of the time left from two on."""
     start = monotonic()
     last = -inf
 
@@ -280,7 +282,7 @@ def _by_lines(label: str, length: int | None, line_every: int | None, every_s: f
         timely = every_s < inf and (now - last >= every_s or done == length)
         if timely or (line_every and done % line_every == 0):
             last = now
-            left = "" if length is None or not 0 < done < length else _left((now - start) / done * (length - done))
+            left = "" if length is None or not 1 < done < length else _left((now - start) / done * (length - done))
             parts = ["" if length is None else f" of {length}", f": {word}" if word else "", left]
             say(f"{label} {done}{''.join(parts)}")
 

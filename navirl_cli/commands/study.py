@@ -40,9 +40,10 @@ from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArtefactError
-from navirl_cli.files import Input, check_writable, replacing, swapped_folder
+from navirl_cli.files import MANIFEST, Input, check_writable, replacing, swapped_folder
 from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.remote import Remote
 
 if TYPE_CHECKING:
     from navirl_cli.irl.terms.term import Term
@@ -173,13 +174,15 @@ class _Given:
 
 
 def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _Given:
-    """Logs extracted, or the demonstrations of a file that extract wrote."""
-    if len(logs) == 1 and logs[0].suffix == ".json":
-        held = demonstrations_in(logs[0])
+    """Logs extracted, or the demonstrations of files that extract wrote."""
+    if all(_holds_demonstrations(path) for path in logs):
+        held = demonstrations_in(*logs)
         demonstrations = whole(held)
         notes = [f"{one.id}: {note}" for one in demonstrations for note in (*one.notes, *one.warnings)]
         lost = [f"left out: {one.id} is cut off" for one in held if one.truncated]
-        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, lost)
+        return _Given(
+            demonstrations, [one.name for one in logs], [Input.of(one) for one in logs], {}, [], set(), notes, lost
+        )
     with bytes_bar("extract") as update:
         found = extract_recordings(logs, ExtractSettings(), options, executor=executor, progress=update)
     results, demonstrations = found.extractions, found.demonstrations()
@@ -193,6 +196,11 @@ def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _G
         found.notes(demonstrations),
         found.lost,
     )
+
+
+def _holds_demonstrations(path: Path) -> bool:
+    """Whether a path is one of a demonstrations file, or of a folder of them."""
+    return path.suffix == ".json" or (not isinstance(path, Remote) and (path / MANIFEST).is_file())
 
 
 def _check_files(output: Path, inputs: Sequence[Path], *, force: bool) -> None:

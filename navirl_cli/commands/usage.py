@@ -188,7 +188,14 @@ class Command(WithExamples):
         """Parse the words, with the values of navirl.toml beside the data in place of defaults."""
         if not ctx.resilient_parsing:
             self._take_experiment(ctx, args)
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except click.BadParameter as error:
+            name, experiment = "" if error.param is None else error.param.name or "", ctx.meta.get(EXPERIMENT)
+            if experiment is not None and ctx.get_parameter_source(name) is ParameterSource.DEFAULT_MAP:
+                text = f"{error.message} ({experiment.path})"
+                raise click.BadParameter(text, error.ctx, error.param, error.param_hint) from error
+            raise
 
     def _take_experiment(self, ctx: click.Context, args: Sequence[str]) -> None:
         """Use the file's values as defaults; a line says which, if the command runs."""

@@ -70,7 +70,7 @@ def _matched(own: Sequence[Demonstration], rows: Sequence[Label], log: str) -> d
         raise LabelError(
             f"{rows[0].where}: expected the starts of the trials of {log} as inspect writes them, found several ways "
             f"to place the table's {counted(len(rows), 'row')} on its {counted(len(own), 'demonstration')}; "
-            f"keep the rows of all its trials"
+            "keep the rows of all its trials, and relabel before trials are selected"
         )
     offset_s = float(np.median(best))
     found = {}

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -51,6 +52,8 @@ def draw_study(
     Returns:
         The .png files of the figures drawn, with the names of :func:`navirl_cli.figures.screens.save_for_screens`.
     """
+    # Before other processes begin, so that these need not import it each: it brings what makes subsets of fonts.
+    import_module("matplotlib.backends.backend_pdf")
     wanted = _wanted(study, pooled, bars)
     for name in FIGURES if force else ():
         for extension in () if name in wanted else FORMATS:

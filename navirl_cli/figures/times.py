@@ -82,23 +82,7 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
                 f"completion times of {modality}: expected seconds above 0, found {values.tolist()}"
             )
     room_in = (panel_width_in(axes) - _AXIS_IN) / len(times)
-    ink = look().ink
-    box = {"edgecolor": ink, "linewidth": _LINE_PT}
-    line = {"color": ink, "linewidth": _LINE_PT, "solid_capstyle": "butt"}
-    drawn = axes.boxplot(
-        list(times.values()),
-        positions=[at + _LEFT for at in range(len(times))],
-        widths=min(_BOXED, _BOX_IN / room_in),
-        patch_artist=True,
-        showfliers=False,
-        manage_ticks=False,
-        boxprops=box,
-        whiskerprops=line,
-        capprops=line,
-        medianprops={**line, "linewidth": 2.0},
-    )
-    for patch, modality in zip(drawn["boxes"], times, strict=True):
-        patch.set_facecolor((colour_of(modality), _OPACITY))
+    drawn = _boxes(axes, times, room_in)
     everything = np.concatenate(list(times.values()))
     highest, lowest = float(everything.max()), float(everything.min())
     logarithmic = highest > _LONG * float(np.median(everything))
@@ -116,6 +100,28 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
     else:
         axes.set_ylim(0.0, 1.06 * highest)
     return DrawnTimes(axes, numbers, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
+
+
+def _boxes(axes: Axes, times: Mapping[str, FloatArray], room_in: float) -> dict[str, Any]:
+    """Draw a box with whiskers for each modality, left of its middle; the artists by kind."""
+    ink = look().ink
+    box = {"edgecolor": ink, "linewidth": _LINE_PT}
+    line = {"color": ink, "linewidth": _LINE_PT, "solid_capstyle": "butt"}
+    drawn: dict[str, Any] = axes.boxplot(
+        list(times.values()),
+        positions=[at + _LEFT for at in range(len(times))],
+        widths=min(_BOXED, _BOX_IN / room_in),
+        patch_artist=True,
+        showfliers=False,
+        manage_ticks=False,
+        boxprops=box,
+        whiskerprops=line,
+        capprops=line,
+        medianprops={**line, "linewidth": 2.0},
+    )
+    for patch, modality in zip(drawn["boxes"], times, strict=True):
+        patch.set_facecolor((colour_of(modality), _OPACITY))
+    return drawn
 
 
 def _number(axes: Axes, at: int, median: float, text: str) -> Annotation:

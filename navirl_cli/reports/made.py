@@ -52,7 +52,7 @@ class Made:
     """The files of a report and how it was asked for."""
 
     #: Of the demonstrations and of the reward.
-    demos: Input
+    demos: tuple[Input, ...]
     reward: Input
     #: Files that the demonstrations were extracted from.
     inputs: Sequence[Input]
@@ -68,7 +68,7 @@ class Made:
     @property
     def files(self) -> list[Input]:
         """All files with their hashes."""
-        return [*self.inputs, self.demos, self.reward]
+        return [*self.inputs, *self.demos, self.reward]
 
     @property
     def logs(self) -> list[str]:
@@ -77,9 +77,9 @@ class Made:
         return [one.file for one in self.inputs if one.file not in others]
 
     @property
-    def names(self) -> tuple[str, str]:
-        """Of the demonstrations, a folder with a / at its end, and of the reward, for command lines."""
-        return self.demos.file.removesuffix(MANIFEST), self.reward.file
+    def names(self) -> list[str]:
+        """Of the demonstrations for command lines: a folder has a / at its end."""
+        return [one.file.removesuffix(MANIFEST) for one in self.demos]
 
 
 def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
@@ -124,15 +124,15 @@ def changed_settings(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -
 
 def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
     """Command lines; none for a fit with a prior of a file without options, which does not name it."""
-    demos, reward = made.names
-    words = extract_words(made.settings, made.usual)
-    extract = shlex.join(["navirl", "extract", *made.logs, *words, "-o", demos])
-    report = shlex.join(["navirl", "report", demos, reward, *made.options, "-o", "report.html"])
+    demos, reward = made.names, made.reward.file
+    lines = [["report", *demos, reward, *made.options, "-o", "report.html"]]
     options = content.get("options")
-    if options is None and (content["prior"] or not taught):
-        return [extract, report]
-    words = _fit_words(taught, content, made) if options is None else options
-    return [extract, shlex.join(["navirl", "fit", demos, *words, "-o", reward]), report]
+    if options is not None or (taught and not content["prior"]):
+        words = _fit_words(taught, content, made) if options is None else options
+        lines.insert(0, ["fit", *demos, *words, "-o", reward])
+    if len(demos) == 1:  # which log is in which of several files is not known
+        lines.insert(0, ["extract", *made.logs, *extract_words(made.settings, made.usual), "-o", *demos])
+    return [shlex.join(["navirl", *line]) for line in lines]
 
 
 def _fit_words(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
