@@ -30,7 +30,8 @@ test-floors:
 	rm -rf $(FLOORS)
 	$(PYTHON) -m venv $(FLOORS)
 	$(PYTHON) tests/floors.py > $(FLOORS)/constraints.txt
-	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev]'
+	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[cluster,pandas,remote,view]' \
+		hypothesis jsonschema 'moto[server]' pytest pytest-xdist
 	$(FLOORS)/bin/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The site, in docs/_build/html; a warning is an error.

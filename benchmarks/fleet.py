@@ -71,6 +71,21 @@ def extraction(logs: list[Path], folder: Path, executor: Executor) -> tuple[floa
     return seconds, seen[-1] / seen[len(seen) // 10]
 
 
+def alone(logs: list[Path], folder: Path) -> Iterator[Row]:
+    """CPU of a log in one process, and the share of its main thread: others decompress."""
+    whole, main = time.process_time(), time.thread_time()
+    extraction(logs, folder / "alone", Local(1))
+    whole, main = time.process_time() - whole, time.thread_time() - main
+    yield Row("CPU of a log, one process", whole / len(logs), "s")
+    yield Row("CPU of its main thread over that of the process", main / whole, "")
+
+
+def cpu_of_children() -> float:
+    """CPU of processes that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def overhead_ms(executor: Executor) -> float:
     """Time of a task without work, ms."""
     return timed(lambda: list(map_in_order(abs, list(range(1000)), executor)))
@@ -157,7 +172,7 @@ def rows(count: int) -> Iterator[Row]:
         folder = Path(name)
         (folder / "logs").mkdir()
         logs = copies(folder / "logs", count)
-        extraction(logs[:2], folder / "warm", Local(1))
+        yield from alone(logs[: max(count // 10, 3)], folder)
         yield Row("start of two local processes", start_s(Local(2)), "s")
         with cluster(2) as executor:
             yield Row("imports of two workers of Dask", start_s(executor), "s")
@@ -169,7 +184,10 @@ def rows(count: int) -> Iterator[Row]:
         yield Row.at_least("files of all three are the same", float(same(folder, ("two", "dask"))), "", 1)
         yield Row("a task without work: Dask", task, "ms")
         yield Row("a task without work: two local processes", overhead_ms(Local(2)), "ms")
+        own, others = time.process_time(), cpu_of_children()
         seconds, growth = extraction(logs, folder / "all", Local(2))
+        own, others = time.process_time() - own, cpu_of_children() - others
+        yield Row("CPU of the process that hands out, over all", own / (own + others), "")
         yield Row(f"{count} logs, two processes", seconds, "s")
         yield Row.at_most("memory at the end over that at a tenth", growth, "", 1.2)
     with TemporaryDirectory() as name:

@@ -13,7 +13,7 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,6 +28,8 @@ from navirl_cli.artefacts.demonstrations import demonstrations_document, read_de
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Contact, Demonstration
 from navirl_cli.demos.grid import Grid
+from navirl_cli.irl.evidence import evidence_of
+from navirl_cli.irl.likelihood import likelihood
 from navirl_cli.irl.scene import Scene
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -99,21 +101,34 @@ def fitted(demos: Path, workers: int) -> tuple[float, float, bytes]:
     return time.perf_counter() - begin, most, reward.read_bytes()
 
 
+def evaluation_ms(demonstrations: Sequence[Demonstration]) -> float:
+    """CPU of one evaluation of the likelihood with its derivatives, ms a scene, when the scenes are built."""
+    evidence = evidence_of(demonstrations)
+    likelihood(evidence, PUBLISHED)
+    begin = time.process_time()
+    likelihood(evidence, PUBLISHED)
+    return 1e3 * (time.process_time() - begin) / len(evidence.scenes)
+
+
 def rows(scenes: int) -> Iterator[Row]:
     """All measurements."""
     made = demonstrations(scenes)
     print(f"{len(made)} demonstrations drawn", file=sys.stderr)
     with TemporaryDirectory() as name:
         path = Path(name) / "demos.json"
-        begin = time.perf_counter()
+        begin, used = time.perf_counter(), time.process_time()
         write_json(path, "demonstrations", demonstrations_document(made, [], {}), force=True)
         yield Row("written", time.perf_counter() - begin, "s")
+        yield Row("written, CPU", time.process_time() - used, "s")
         yield Row("file", path.stat().st_size / 1e6, "MB")
-        begin = time.perf_counter()
+        begin, used = time.perf_counter(), time.process_time()
         found = read_demonstrations(path)
         yield Row("read", time.perf_counter() - begin, "s")
+        yield Row("read, CPU", time.process_time() - used, "s")
         assert len(found) == len(made)  # noqa: S101
         yield Row("memory of this process", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, "GB")
+        yield Row("an evaluation of the likelihood, a scene", evaluation_ms(found[:200]), "ms")
+        del found, made
         one, memory, first = fitted(path, 1)
         yield Row("fit, one process", one, "s")
         yield Row.at_most("memory of the fit, one process", memory, "GB", 4)
@@ -130,7 +145,11 @@ def main() -> int:
     parser.add_argument("--scenes", type=int, default=5000, help="number of scenes, with two demonstrations each")
     parser.add_argument("--json", action="store_true", help="print JSON")
     given = parser.parse_args()
-    return report(list(rows(given.scenes)), as_json=given.json)
+    found = []
+    for row in rows(given.scenes):
+        found.append(row)
+        print(f"{row.what}: {row.value:.4g} {row.unit}", file=sys.stderr, flush=True)
+    return report(found, as_json=given.json)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from hashlib import md5
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
+from urllib.parse import unquote
 
 
 @dataclass
@@ -66,7 +67,7 @@ def serving(**objects):
 def answer(handler, store, *, body):
     found = re.fullmatch(r"bytes=(\d+)-(\d+)", handler.headers.get("Range", ""))
     store.asked.append((handler.command, handler.path, found and (int(found[1]), int(found[2]) + 1)))
-    path = handler.path.partition("?")[0]
+    path = unquote(handler.path.partition("?")[0])
     if store.replaced_after is not None and len(store.asked) > store.replaced_after:
         store.objects[path] = store.objects[path][:-1] + b"?"
     if store.refusal is not None or path not in store.objects or (body and store.busy):

@@ -7,8 +7,8 @@ from rosbags.interfaces import Nodetype
 
 from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.messages import decode
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.logs.messages.schema import parse_definition
 
 WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x", "wrench.force.z", "wrench.torque.y")
 TF_FIELDS = tuple(

@@ -14,8 +14,6 @@ from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.errors import ArgumentError, DemonstrationError
 
-pytestmark = pytest.mark.xdist_group("joined")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

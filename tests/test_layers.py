@@ -51,7 +51,7 @@ ORDERS = {
     ],
     "navirl_cli.logs.messages": [
         ["__init__", "schema", "single"],
-        ["layout"],
+        ["definitions", "layout"],
         ["decode", "writer"],
         ["packing"],
         ["series"],

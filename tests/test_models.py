@@ -199,7 +199,13 @@ def study(tmp_path_factory):
 
 
 @needs_study
-@pytest.mark.parametrize(("condition", "names"), OPTIMA)
+@pytest.mark.parametrize(
+    ("condition", "names"),
+    [
+        pytest.param(*which, marks=pytest.mark.slow if which == ("joystick", f"{SATURATING},turn") else [])
+        for which in OPTIMA
+    ],
+)
 def test_optima_on_the_published_study(study, condition, names):
     value, theta = OPTIMA[condition, names]
     found = fit(study[condition], Reward.named({}, tuple(TERMS[name] for name in names.split(","))))

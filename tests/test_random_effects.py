@@ -1,14 +1,15 @@
 """Random effects: against a grid without approximation, closed forms, and finite differences."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import oracles
 import pytest
+from scipy.stats import chi2
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.newton import Point
-from navirl_cli.irl.nodes import draw, laplace, scattered
+from navirl_cli.irl.nodes import draw, laplace, sampled, scattered
 from navirl_cli.irl.random_effects import random_effects
 from navirl_cli.irl.restricted import LEAST, WIDTH, Restricted
 from navirl_cli.irl.spread import Factors, Spread
@@ -80,9 +81,42 @@ def test_lopsided_people_are_those_of_a_grid():
     assert np.sqrt(found.mixture.person_covariance[:, 0, 0]) == pytest.approx(deviation, rel=0.15)
 
 
+def test_far_from_their_spread_skewed_people_are_still_those_of_a_grid():
+    """Gaussian stand-ins made under a small scatter find a larger one too unlikely."""
+    people = [Lopsided(at, 2.0) for at in (0.2, 0.8, 1.4)]
+    near, far = Spread(np.array([1.0]), np.array([0.2])), Spread(np.array([0.8]), np.array([0.6]))
+    places = np.linspace(-6, 4, 20_001)
+    logs = np.array([[one.value(np.array([y])) for y in places] for one in people])
+    weight = np.exp(logs + far.log_density(places[:, None]))
+    exact = np.log(weight.sum(axis=1) * (places[1] - places[0]))
+    around = [laplace(one, near.wider(2.0), near.mean) for one in people]
+    known = sampled(
+        [draw(one, mode, number=k) for k, (one, mode) in enumerate(zip(people, around, strict=True))], near.wider(2.0)
+    )
+    mean, *_, found = known.moments(far)
+    assert found == pytest.approx(exact, abs=0.02)
+    assert mean[:, 0] == pytest.approx(weight @ places / weight.sum(axis=1), abs=0.02)
+    standing = Factors.of([laplace(one, near, near.mean) for one in people], near)
+    rise = [(known.moments(one)[2] - standing.moments(one)[2]).sum() for one in (near, far)]
+    assert rise[1] - rise[0] > 0.1
+
+
+def test_draws_around_two_approximations_count_together():
+    person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
+    mode = laplace(person, spread, spread.mean)
+    beside = replace(mode, mean=mode.mean + 1.0)
+    both = draw(person, beside).and_also(draw(person, mode, number=1))
+    assert both.around == (beside, mode)
+    right = sampled([draw(person, mode, number=2)], spread).posteriors(spread)[0]
+    known = sampled([both], spread).posteriors(spread)[0]
+    assert known.drawn == 2 * right.drawn
+    assert known.mean == pytest.approx(right.mean, abs=0.05 * np.sqrt(right.covariance[0, 0]))
+    assert known.evidence == pytest.approx(right.evidence, abs=0.02)
+
+
 def test_a_posterior_under_a_spread_is_that_of_a_grid():
     person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
-    known = draw(person, laplace(person, spread, spread.mean), spread).under(spread)
+    known = sampled([draw(person, laplace(person, spread, spread.mean))], spread).posteriors(spread)[0]
     places = np.linspace(-4, 5, 20_001)
     logs = np.array([person.value(np.array([y])) for y in places]) + spread.log_density(places[:, None])
     weight = np.exp(logs)
@@ -100,16 +134,16 @@ def test_gaussian_people_with_much_information_scatter_as_they_do():
     at = np.array([one.at for one in people])
     mean, _ = found.mixture.typical()
     assert mean == pytest.approx(at.mean(axis=0), abs=1e-3)
-    # The mode of the density of the logarithm of a restricted scatter is the usual standard deviation, but for its 1.
-    assert found.spread.scatter == pytest.approx(at.std(axis=0, ddof=1) * np.sqrt(11 / 10), rel=0.01)
-    assert found.mixture.differ.all()
+    # With a flat density of the scatter, the sum of squares over its square has a chi-squared distribution, n - 2.
+    assert found.spread.scatter == pytest.approx(np.sqrt(12 * at.var(axis=0) / chi2.median(10)), rel=0.03)
+    assert found.differ.all()
     assert found.mixture.person_mean == pytest.approx(at, abs=1e-3)
 
 
 def test_people_who_are_alike_are_not_said_to_differ():
     alike = [Bell(one.at, one.precision) for one in bells(scatter=(0.0, 0.0), seed=5)]
     found = random_effects(alike, np.zeros(2), executor=Local(1))
-    assert not found.mixture.differ.any()
+    assert not found.differ.any()
     at = np.array([one.at for one in alike])
     mean, _ = found.mixture.typical()
     away = np.abs(found.mixture.person_mean - mean)

@@ -7,9 +7,10 @@ import log_factory as forge
 import numpy as np
 import pytest
 
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.layout import derive
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.logs.messages.schema import DecodeError, JsonSchema, SchemaError, parse_definition
+from navirl_cli.logs.messages.schema import DecodeError, JsonSchema, SchemaError
 
 #: Chunks of a message each.
 TINY = {"chunk_size": 1}

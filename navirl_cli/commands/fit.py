@@ -177,11 +177,8 @@ def fit(
     kind = None if intervals is None else Kind(intervals)
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
-    files = [
-        *demos,
-        *([Path(initial)] if initial and "=" not in initial else []),
-        *([prior_file] if prior_file else []),
-    ]
+    named = [Path(initial)] if initial and "=" not in initial else []
+    files = [*demos, *named, *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
     given = _given(initial)
     if prior_file is None:
@@ -206,15 +203,13 @@ def fit(
         with evidence.kept_by(executor) as kept:
             plain = _learn(kept, start, prior, l2, Method(method))
         effect = reach_effect(chosen, plain, Steps(steps), reach, evidence, executor)
-        whole = Steps(steps) is Steps.ALL
-        others = None if earlier is None else earlier.others
+        others, whole = None if earlier is None else earlier.others, Steps(steps) is Steps.ALL
         found, analyses, lost = answers(
             evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
         )
     inputs = [Input.of(path) for path in files]
     document = reward_document(found, chosen, inputs, selected.resolution_m, analyses, steps, effect)
-    if person is not None and earlier is not None:
-        document |= whose(person, earlier.participants)
+    document |= {} if person is None or earlier is None else whose(person, earlier.participants)
     document["options"] = given_words()
     write_json(output, "reward", document, force=force)
     notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)

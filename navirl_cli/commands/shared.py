@@ -272,7 +272,7 @@ def progress_bar(
 
 
 def _by_lines(label: str, length: int | None, line_every: int | None, every_s: float) -> Callable[[int, str], None]:
-    """Progress as lines after so many steps, and after so much time, with an estimate of the time that is left."""
+    """Progress as lines after so many steps, and after so much time, with an estimate of the time left from two on."""
     start = monotonic()
     last = -inf
 
@@ -282,7 +282,7 @@ def _by_lines(label: str, length: int | None, line_every: int | None, every_s: f
         timely = every_s < inf and (now - last >= every_s or done == length)
         if timely or (line_every and done % line_every == 0):
             last = now
-            left = "" if length is None or not 0 < done < length else _left((now - start) / done * (length - done))
+            left = "" if length is None or not 1 < done < length else _left((now - start) / done * (length - done))
             parts = ["" if length is None else f" of {length}", f": {word}" if word else "", left]
             say(f"{label} {done}{''.join(parts)}")
 

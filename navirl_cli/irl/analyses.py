@@ -67,7 +67,7 @@ class Questions:
             refuse_beside(
                 "`pool` persons has intervals of its own and no prior",
                 {"prior": prior, **self._of_one_reward},
-                "ask for it in another fit without `pool`",
+                "ask for them in another fit without `pool`",
             )
         if self.person is not None and not prior:
             raise ArgumentError(
@@ -78,7 +78,7 @@ class Questions:
             refuse_beside(
                 "`person` has intervals of its own",
                 self._of_one_reward,
-                "ask for it in a fit to these demonstrations alone, with `participant`, not `person` and `prior`",
+                "ask for them in a fit to these demonstrations alone, with `participant`, not `person` and `prior`",
             )
         if self.cross_validate:
             why = "`cross_validate` predicts participants whom the prior may know"

@@ -1,18 +1,28 @@
 """The posterior of scatters, mean and people together, by places of the scatters."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from navirl_cli.arrays import BoolArray, ByContent, FloatArray
 from navirl_cli.irl.nodes import scattered
-from navirl_cli.irl.restricted import LEAST, Restricted, best_spread
+from navirl_cli.irl.restricted import LEAST, MOST, Restricted, climbed
 from navirl_cli.irl.spread import Posterior, Spread
 
-#: Pairs of places of the scatters, and the least curvature assumed for their distribution.
-PLACES, FLATTEST = 200, 0.5
+#: Pairs of places of the scatters by round, and the effective number of places at which no further round is needed.
+PLACES, ENOUGH = (60, 120, 120, 120), 60.0
+#: A round with a smaller effective number only shows roughly where the next one has to look: its weights are flattened.
+ROUGH = 25.0
+#: Standard deviation of the first round's places, as a share of the root of a scatter, and the least scatter for it.
+#: Later rounds are wider than the distribution that the last one found.
+FIRST_WIDTH, FIRST_LEAST, WIDER = 0.2, 0.05, 1.1
+#: Newton's steps to the best mean at given scatters, and the step that needs no other, in standard errors.
+MEAN_STEPS, SMALL_STEP = 4, 0.02
+#: Least share of the information of a mean that people's paths must leave; what is less is noise of the nodes.
+LEAST_INFORMATION = 1e-3
 #: Fall of the log-likelihood at the end of a 95 % interval, nats: half the quantile of chi-squared.
-FALL = 1.920729
+FALL: Final = 1.920729
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,37 +38,82 @@ class Mixture(ByContent):
     #: (n, v) and (n, v, v) of the people, over all places.
     person_mean: FloatArray
     person_covariance: FloatArray
-    #: (v,) whether a scatter of zero is excluded, by the restricted likelihood.
-    differ: BoolArray
 
     @staticmethod
-    def of(objective: Restricted, best: Spread) -> "Mixture":
-        """By importance sampling of the scatters around the maximum."""
-        v = len(best.mean)
-        surface = _Scatters(objective, best)
-        top = objective(best.x)
-        # What is left of the curvature when the mean follows the scatters.
-        block = -top.hessian
-        curvature = block[v:, v:] - block[v:, :v] @ np.linalg.solve(block[:v, :v], block[:v, v:])
-        values, basis = np.linalg.eigh(curvature)
-        covariance = (basis / np.maximum(values, FLATTEST)) @ basis.T
-        around = Posterior(np.log(best.scatter), covariance, 0.0, np.nan, 0)
-        y, density = scattered(around, PLACES, 0)
-        logs = np.array([surface.value(one) for one in y]) - density
-        weight = np.exp(logs - logs.max())
-        places = [surface.at(one) for one in y]
-        mean, known = np.array([one.mean for one in places]), []
-        errors = np.array([np.linalg.inv(objective.information_of_mean(one)) for one in places])
-        weight = weight / weight.sum()
-        for one, error in zip(places, errors, strict=True):
-            own, within, _ = objective.factors.moments(one)
-            carried = within / one.scatter**2
-            known.append((own, within + carried @ error @ np.swapaxes(carried, 1, 2)))
-        means, within = (np.array(part) for part in zip(*known, strict=True))
-        person_mean = np.einsum("h,hnv->nv", weight, means)
-        away = means - person_mean
-        total = np.einsum("h,hnij->nij", weight, within) + np.einsum("h,hni,hnj->nij", weight, away, away)
-        return Mixture(weight, np.exp(y), mean, errors, person_mean, total, _differ(objective, best))
+    def of(objective: Restricted, start: Spread) -> "Mixture":
+        """By importance sampling of the scatters, in rounds around what the last one found.
+
+        The places are even in the roots of the scatters, by which their distribution is nearly normal where it reaches
+        to zero.
+
+        Args:
+            objective: The restricted likelihood.
+            start: Where the first round looks.
+        """
+        center = np.sqrt(start.scatter)
+        covariance = np.diag((FIRST_WIDTH * np.sqrt(np.maximum(start.scatter, FIRST_LEAST))) ** 2)
+        for number, pairs in enumerate(PLACES):
+            roots, density = scattered(Posterior(center, covariance, 0.0, np.nan, 0), pairs, number)
+            inside = ((roots > np.sqrt(LEAST)) & (roots < np.sqrt(MOST))).all(axis=1)
+            roots, density = roots[inside], density[inside]
+            places = [_best_mean(objective, Spread(start.mean, one**2)) for one in roots]
+            # From a density of the logarithms of the scatters to one of their roots.
+            logs = np.array([one.value for one in places]) - np.log(roots).sum(axis=1) - density
+            weight = np.exp(logs - logs.max())
+            effective = float(weight.sum() ** 2 / (weight**2).sum())
+            if effective > ENOUGH and number > 0:
+                break
+            flat = np.sqrt(weight) if effective < ROUGH else weight
+            center = flat @ roots / flat.sum()
+            away = roots - center
+            covariance = WIDER**2 * (away * flat[:, None]).T @ away / flat.sum() + LEAST**2 * np.eye(len(center))
+        return Mixture._over(objective, [one for one, w in zip(places, weight, strict=True) if w > 0], weight)
+
+    @staticmethod
+    def _over(objective: Restricted, places: list["_Place"], weight: FloatArray) -> "Mixture":
+        """Over places with weights, of which those that are zero have no place."""
+        weight = weight[weight > 0] / weight.sum()
+        means, within = [], []
+        for one in places:
+            own, covariance, _ = objective.people.moments(one.spread)
+            carried = covariance / one.spread.scatter**2
+            means.append(own)
+            within.append(covariance + carried @ one.covariance @ np.swapaxes(carried, 1, 2))
+        person_mean = np.einsum("h,hnv->nv", weight, np.array(means))
+        away = np.array(means) - person_mean
+        between = np.einsum("h,hni,hnj->nij", weight, away, away)
+        return Mixture(
+            weight,
+            np.array([one.spread.scatter for one in places]),
+            np.array([one.spread.mean for one in places]),
+            np.array([one.covariance for one in places]),
+            person_mean,
+            np.einsum("h,hnij->nij", weight, np.array(within)) + between,
+        )
+
+    @property
+    def effective(self) -> float:
+        """Effective number of places (Kish)."""
+        return 1.0 / float((self.weight**2).sum())
+
+    @property
+    def spread(self) -> Spread:
+        """The mean, and the root of the mean square of each scatter."""
+        return Spread(self.typical()[0], np.sqrt(self.weight @ self.scatter**2))
+
+    @property
+    def middle(self) -> Spread:
+        """The mean, and the medians of the scatters."""
+        numbers = range(self.scatter.shape[1])
+        return Spread(self.typical()[0], np.array([self.scatter_quantile(j, 0.5) for j in numbers]))
+
+    def away(self, other: "Mixture") -> float:
+        """Largest difference from another of the mean of a variable or a scatter, in this one's standard deviations."""
+        mean, covariance = self.typical()
+        scatter = self.weight @ self.scatter
+        error = np.sqrt(self.weight @ (self.scatter - scatter) ** 2)
+        moved = np.abs(mean - other.typical()[0]) / np.sqrt(np.diag(covariance))
+        return float(np.maximum(moved, np.abs(scatter - other.weight @ other.scatter) / error).max())
 
     def typical(self) -> tuple[FloatArray, FloatArray]:
         """(v,) mean over people, and its (v, v) covariance."""
@@ -89,33 +144,39 @@ class Mixture(ByContent):
 
 
 @dataclass(frozen=True, eq=False)
-class _Scatters:
-    """The restricted likelihood by the logarithms of the scatters, each with the best mean."""
+class _Place:
+    """Scatters with their best mean, its (v, v) covariance, and the restricted log-likelihood; -inf without a best."""
 
-    objective: Restricted
-    best: Spread
+    spread: Spread
+    covariance: FloatArray
+    value: float
 
-    def at(self, y: FloatArray) -> Spread:
-        """The scatters with their best mean, which solves a linear system."""
-        spread = Spread(self.best.mean, np.exp(y))
-        own, _, _ = self.objective.factors.moments(spread)
+
+def _best_mean(objective: Restricted, start: Spread) -> _Place:
+    """The place of scatters: Newton's steps to the best mean, of which Gaussian likelihoods need one."""
+    spread, unit = start, np.outer(start.scatter, start.scatter)
+    for _ in range(MEAN_STEPS):
+        own, covariance, _ = objective.people.moments(spread)
         slope = ((own - spread.mean) / spread.scatter**2).sum(axis=0)
-        step = np.linalg.solve(self.objective.information_of_mean(spread), slope)
-        return Spread(spread.mean + step, spread.scatter)
+        values, basis = np.linalg.eigh(objective.information(covariance, spread) * unit)
+        if values[0] < LEAST_INFORMATION * len(own):
+            return _Place(spread, np.zeros_like(unit), -np.inf)
+        error = (basis / values) @ basis.T * unit
+        step = error @ slope
+        spread = Spread(spread.mean + step, spread.scatter)
+        if step @ slope < SMALL_STEP**2:
+            break
+    return _Place(spread, error, objective.value(spread))
 
-    def value(self, y: FloatArray) -> float:
-        """Its logarithm."""
-        return self.objective.value(self.at(y))
 
-
-def _differ(objective: Restricted, best: Spread) -> BoolArray:
+def excluded(objective: Restricted, start: Spread) -> BoolArray:
     """(v,) whether the restricted likelihood excludes that a scatter is zero, at 5 %."""
-    v = len(best.mean)
-    plain = Restricted(objective.factors, objective.width, jacobian=False)
-    top = best_spread(plain, best).value
+    v = len(start.mean)
+    plain = Restricted(objective.people, objective.width, jacobian=False)
+    top = climbed(plain, start)
     found = np.zeros(v, dtype=bool)
     for j in range(v):
-        x = best.x.copy()
+        x = top.x
         x[v + j] = np.log(LEAST)
-        found[j] = top - best_spread(plain, Spread.at(x), fixed=v + j).value > FALL
+        found[j] = plain.value(top) - plain.value(climbed(plain, Spread.at(x), fixed=v + j)) > FALL
     return found

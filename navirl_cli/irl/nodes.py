@@ -1,17 +1,19 @@
 """What is known of one person under a spread: by the mode of the posterior (Laplace), and by importance sampling.
 
-Nodes are drawn from Student's distribution around an approximation. What the same nodes get wrong with the Gaussian
-stand-in for the likelihood, whose moments are known, is subtracted.
+Nodes are drawn from Student's distribution around an approximation, and again around a better one. All of them count,
+by the mixture of the densities.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from navirl_cli.arrays import FloatArray
+from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.errors import RewardError
-from navirl_cli.irl.newton import Point, maximise
+from navirl_cli.irl.newton import Effort, Point, maximise
+from navirl_cli.irl.sampled import Sampled
 from navirl_cli.irl.spread import Factors, Posterior, Spread
 
 #: Largest number of pairs of nodes of a person, on either side of the mode. Degrees of freedom of their distribution,
@@ -19,6 +21,8 @@ from navirl_cli.irl.spread import Factors, Posterior, Spread
 MOST_PAIRS, FREEDOM = 64, 6.0
 #: Even numbers keep away from 0 and 1 by this.
 TINY = 1e-6
+#: A mode is found where the next step is expected to gain less, nats.
+NEAR = 1e-3
 #: Least curvature of a posterior at its mode, as a share of that of the prior.
 WIDEST = 0.3
 
@@ -38,42 +42,40 @@ class Likely(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
-    """Places around a person's mode, with the person's log-likelihood and the log density that they were drawn from."""
+class Nodes(ByContent):
+    """Places around a person's mode, with the person's log-likelihood."""
 
-    #: (n, v), (n,), (n,).
+    #: (d, v) and (d,).
     y: FloatArray
     value: FloatArray
-    density: FloatArray
-    #: The Gaussian stand-in for the likelihood at the mode.
-    factor: Factors
+    #: The approximations around which they were drawn, as many from each.
+    around: tuple[Posterior, ...]
 
-    def under(self, spread: Spread) -> Posterior:
-        """The posterior under a spread, by importance sampling.
+    @property
+    def density(self) -> FloatArray:
+        """(d,) log density of a place, whichever approximation it was drawn around.
 
-        The error that the same nodes make with the Gaussian stand-in, whose moments are known, is subtracted (control
-        variates), so that a Gaussian likelihood has exact results.
+        So that a few draws around a bad approximation do no harm (Veach and Guibas 1995, Proc. SIGGRAPH, 419).
         """
-        prior = spread.log_density(self.y) - self.density
-        mean, covariance, evidence, effective = _moments(self.y, self.value + prior)
-        standing = -0.5 * np.einsum("ni,ij,nj->n", self.y, self.factor.a[0], self.y) + self.y @ self.factor.b[0]
-        drawn = _moments(self.y, standing + prior)
-        known = tuple(one[0] for one in self.factor.moments(spread))
-        better = covariance - drawn[1] + known[1]
-        if np.linalg.eigvalsh(better)[0] > 0.5 * min(np.linalg.eigvalsh(one)[0] for one in (covariance, known[1])):
-            mean, covariance = mean - drawn[0] + known[0], better
-        return Posterior(mean, covariance, evidence - drawn[2] + float(known[2]), effective, len(self.y))
+        logs = np.array([_log_density(one, self.y) for one in self.around])
+        found: FloatArray = np.logaddexp.reduce(logs, axis=0) - np.log(len(logs))
+        return found
+
+    def and_also(self, others: "Nodes") -> "Nodes":
+        """These and others of the same person."""
+        y, value = np.concatenate([self.y, others.y]), np.concatenate([self.value, others.value])
+        return Nodes(y, value, self.around + others.around)
 
 
-def _moments(y: FloatArray, logs: FloatArray) -> tuple[FloatArray, FloatArray, float, float]:
-    """Mean and covariance of weighted places, log of the mean weight, and the effective number (Kish)."""
-    top = float(logs.max())
-    weight = np.exp(logs - top)
-    share = weight / weight.sum()
-    mean = share @ y
-    away = y - mean
-    covariance = (away * share[:, None]).T @ away
-    return mean, covariance, top + float(np.log(weight.mean())), 1.0 / float((share**2).sum())
+def sampled(people: Sequence[Nodes], spread: Spread) -> Sampled:
+    """All people by their nodes.
+
+    Args:
+        people: As many nodes of each.
+        spread: Under which the last approximations hold; they are the Gaussian stand-ins.
+    """
+    y, value, density = (np.array([getattr(one, name) for one in people]) for name in ("y", "value", "density"))
+    return Sampled(y, value, density, Factors.of([one.around[-1] for one in people], spread))
 
 
 def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
@@ -93,7 +95,8 @@ def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
     first = objective(np.clip(start, low, high))
     if not np.isfinite(first.value):
         raise RewardError("`pool`: expected a policy for every person at the pooled reward, found none for one of them")
-    best = maximise(objective, first, person.bounds, np.ones(len(start), dtype=bool)).best
+    near = Effort(enough=NEAR)
+    best = maximise(objective, first, person.bounds, np.ones(len(start), dtype=bool), effort=near).best
     size = spread.scatter
     values, basis = np.linalg.eigh(-best.hessian * np.outer(size, size))
     kept = np.maximum(values, WIDEST)  # the likelihood may be convex in a direction, the prior limits it
@@ -102,18 +105,17 @@ def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
     return Posterior(best.x, covariance, best.value + area, np.nan, 0)
 
 
-def draw(person: Likely, around: Posterior, spread: Spread, pairs: int = MOST_PAIRS, number: int = 0) -> Nodes:
-    """Nodes around a posterior, with the person's log-likelihood.
+def draw(person: Likely, around: Posterior, pairs: int = MOST_PAIRS, number: int = 0) -> Nodes:
+    """Nodes around an approximation of a posterior, with the person's log-likelihood.
 
     Args:
         person: The log-likelihood.
-        around: An approximation of the posterior under a spread.
-        spread: That spread.
+        around: The approximation.
         pairs: Of nodes.
-        number: Of the person, so that errors of several people are independent.
+        number: Of the draw, so that errors of several people or draws are independent.
     """
-    y, density = scattered(around, pairs, number)
-    return Nodes(y, np.array([person.value(one) for one in y]), density, Factors.of([around], spread))
+    y = scattered(around, pairs, number)[0]
+    return Nodes(y, np.array([person.value(one) for one in y]), (around,))
 
 
 def scattered(around: Posterior, pairs: int, number: int) -> tuple[FloatArray, FloatArray]:
@@ -127,7 +129,7 @@ def scattered(around: Posterior, pairs: int, number: int) -> tuple[FloatArray, F
         pairs: How many.
         number: Seed of the recurrence's start.
     """
-    from scipy.special import gammainccinv, gammaln, ndtri
+    from scipy.special import gammainccinv, ndtri
 
     v = len(around.mean)
     golden = 2.0
@@ -137,9 +139,17 @@ def scattered(around: Posterior, pairs: int, number: int) -> tuple[FloatArray, F
     even = np.clip((shift + np.outer(np.arange(pairs), golden ** -np.arange(1.0, v + 2))) % 1.0, TINY, 1 - TINY)
     stretch = np.sqrt(FREEDOM / (2 * gammainccinv(FREEDOM / 2, even[:, -1])))
     normal = ndtri(even[:, :-1]) * stretch[:, None]
-    unit = np.concatenate([normal, -normal])
-    root = np.linalg.cholesky(around.covariance)
+    y = around.mean + np.concatenate([normal, -normal]) @ np.linalg.cholesky(around.covariance).T
+    return y, _log_density(around, y)
+
+
+def _log_density(around: Posterior, y: FloatArray) -> FloatArray:
+    """(d,) log density of Student's distribution around a mode at (d, v) y."""
+    from scipy.special import gammaln
+
+    v, root = len(around.mean), np.linalg.cholesky(around.covariance)
+    unit = np.linalg.solve(root, (y - around.mean).T)
     constant = gammaln((FREEDOM + v) / 2) - gammaln(FREEDOM / 2) - 0.5 * v * np.log(FREEDOM * np.pi)
     constant -= np.log(np.diag(root)).sum()
-    density: FloatArray = constant - 0.5 * (FREEDOM + v) * np.log1p((unit**2).sum(axis=1) / FREEDOM)
-    return around.mean + unit @ root.T, density
+    found: FloatArray = constant - 0.5 * (FREEDOM + v) * np.log1p((unit**2).sum(axis=0) / FREEDOM)
+    return found

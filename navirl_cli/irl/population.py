@@ -141,7 +141,7 @@ def population(
         scatter_lower=quantiles[0],
         scatter_upper=quantiles[2],
         scatter_squared=known.weight @ known.scatter**2,
-        differ=known.differ,
+        differ=found.differ,
         persons=tuple(persons),
         log_likelihood=found.log_likelihood,
         log_likelihood_alike=pooled.objective,

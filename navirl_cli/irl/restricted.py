@@ -9,40 +9,46 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.newton import Point, maximise
-from navirl_cli.irl.spread import Factors, Spread
+from navirl_cli.irl.spread import Factors, Known, Posterior, Spread
 
 #: A scatter (standard deviation of a logarithm) is weakly held by half a normal distribution of this width: that most
 #: people differ by more than a factor of three in a parameter is not expected.
 WIDTH = 0.5
 #: Bounds of a scatter. At the lower one it counts as zero.
 LEAST, MOST = 0.01, 3.0
+#: Largest move of a round: of the mean in scatters, of the logarithm of a scatter. Farther away the Gaussian stand-ins
+#: say nothing about the likelihoods. Number of rounds.
+REACH, ROUNDS = (1.0, 0.7), 5
 #: Difference of logarithms for a derivative.
 DELTA = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Restricted:
-    """The restricted log-likelihood of mean and log scatters, with the weak prior of the scatters."""
+    """The restricted log-likelihood of mean and log scatters, with the weak prior of the scatters.
 
-    factors: Factors
+    Value and information hold for all people whose moments are known, the derivatives for Gaussian likelihoods.
+    """
+
+    people: Known
     width: float = WIDTH
     #: As a density of the logarithms of the scatters, or of the scatters.
     jacobian: bool = True
 
     def value(self, spread: Spread) -> float:
-        """The value alone."""
-        _, _, logs = self.factors.moments(spread)
-        lost = 0.5 * float(np.linalg.slogdet(self.information_of_mean(spread))[1])
-        return float(logs.sum()) - lost + self._prior(spread)
+        """The value alone; -inf where the mean has no positive information."""
+        _, covariance, logs = self.people.moments(spread)
+        sign, size = np.linalg.slogdet(self.information(covariance, spread))
+        return float(logs.sum()) - 0.5 * float(size) + self._prior(spread) if sign > 0 else -np.inf
 
     def _prior(self, spread: Spread) -> float:
         """Log density of the scatters, up to a constant."""
         held = -0.5 * float(((spread.scatter / self.width) ** 2).sum())
         return held + (float(np.log(spread.scatter).sum()) if self.jacobian else 0.0)
 
-    def information_of_mean(self, spread: Spread) -> FloatArray:
-        """(v, v) observed information of the mean at given scatters."""
-        _, covariance, _ = self.factors.moments(spread)
+    @staticmethod
+    def information(covariance: FloatArray, spread: Spread) -> FloatArray:
+        """(v, v) observed information of the mean at given scatters, by the people's (n, v, v) covariances."""
         precision = 1.0 / spread.scatter**2
         found: FloatArray = len(covariance) * np.diag(precision) - np.outer(precision, precision) * covariance.sum(
             axis=0
@@ -72,7 +78,7 @@ class Restricted:
 
     def _marginal(self, spread: Spread) -> tuple[float, FloatArray, FloatArray]:
         """The marginal log-likelihood with its derivatives, by the identities of Fisher and Louis (1982)."""
-        mean, covariance, logs = self.factors.moments(spread)
+        mean, covariance, logs = self.people.moments(spread)
         p = 1.0 / spread.scatter**2
         away, spreads = mean - spread.mean, np.einsum("njj->nj", covariance)
         scaled = covariance * np.outer(p, p)
@@ -88,9 +94,10 @@ class Restricted:
         """Half the log determinant of the mean's information, and its (2v,) gradient."""
         spread = Spread.at(x)
         v = len(spread.mean)
-        information = self.information_of_mean(spread)
-        _, covariance, _ = self.factors.moments(spread)
-        gained = np.einsum("nij,njk->nik", covariance, self.factors.a)  # minus what the mean leaves of a shift of it
+        _, covariance, _ = self.people.moments(spread)
+        information = self.information(covariance, spread)
+        # What a posterior mean does not follow of a shift of the mean over people.
+        gained = np.eye(v) - covariance / spread.scatter**2
         variance = np.linalg.inv(information)
         freed = np.einsum("nij,jk,nik->i", gained, variance, gained) / spread.scatter**2
         return 0.5 * float(np.linalg.slogdet(information)[1]), np.concatenate([np.zeros(v), -freed])
@@ -118,3 +125,21 @@ def best_spread(
     low = np.maximum(start.x - wide, np.concatenate([-ends, np.full(v, np.log(LEAST))]))
     high = np.minimum(start.x + wide, np.concatenate([ends, np.full(v, np.log(MOST))]))
     return maximise(objective, objective(start.x), (low, high), free).best
+
+
+def climbed(objective: Restricted, start: Spread, fixed: int | None = None) -> Spread:
+    """About the maximum for people whose likelihoods are not Gaussian: rounds with Gaussian stand-ins.
+
+    Args:
+        objective: The restricted likelihood.
+        start: Where the search starts.
+        fixed: A variable that is held, by number.
+    """
+    best = start
+    for _ in range(ROUNDS):
+        mean, covariance, log = objective.people.moments(start)
+        factors = Factors.of([Posterior(*one, np.nan, 0) for one in zip(mean, covariance, log, strict=True)], start)
+        standing = Restricted(factors, objective.width, objective.jacobian)
+        start = Spread.at(best_spread(standing, start, fixed, REACH).x)
+        best = max(best, start, key=objective.value)
+    return best

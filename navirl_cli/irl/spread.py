@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -26,6 +27,10 @@ class Spread(ByContent):
         v = len(x) // 2
         return Spread(x[:v], np.exp(x[v:]))
 
+    def wider(self, times: float) -> "Spread":
+        """With so many times the scatter."""
+        return Spread(self.mean, times * self.scatter)
+
     def log_density(self, y: FloatArray) -> FloatArray:
         """(...) log density at (..., v) y."""
         away = (y - self.mean) / self.scatter
@@ -45,6 +50,13 @@ class Posterior(ByContent):
     #: Effective number of the drawn nodes (Kish), and their number.
     effective: float
     drawn: int
+
+
+class Known(Protocol):
+    """People of whom it is known what they are like under any spread."""
+
+    def moments(self, spread: Spread) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, v) posterior means, (n, v, v) covariances, and (n,) log integrals of likelihood times density."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,10 @@ from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.findings import Severity
 from navirl_cli.logs.load import Line, LoadOptions, follow
 from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.reader import Contents, Progress, message_times, scan
 from navirl_cli.logs.messages.reader import check as check_messages
-from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
 from navirl_cli.logs.roles.receipts import wrong_receipts

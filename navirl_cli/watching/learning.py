@@ -71,7 +71,7 @@ class Choice:
         """
         if self.earlier is None:
             return None
-        return self.earlier.as_prior() if self.others is None else _as_prior(self.others)
+        return self.earlier.as_prior() if self.others is None else self.others.prior()
 
     @property
     def start(self) -> Reward:
@@ -135,15 +135,6 @@ def _one_participant(selected: Selection) -> str:
             f"one participant, found {', '.join(names)}; name the participant with `participant`"
         )
     return names[0]
-
-
-def _as_prior(others: Others) -> Prior:
-    """What earlier people say about the next one, as a normal distribution of the parameters at the typical person."""
-    scale = others.scale
-    typical = np.array(scale.at(others.spread.mean).theta)
-    errors = np.full(len(typical), np.nan)
-    errors[scale.varying] = typical[scale.varying] * others.spread.scatter
-    return Prior.gaussian(typical, np.diag(errors**2))
 
 
 def confirmed(learnt: Learnt, choice: Choice) -> tuple[Learnt, str]:

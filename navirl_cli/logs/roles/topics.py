@@ -7,8 +7,9 @@ from typing import Final
 from navirl_cli.errors import MOST_NAMES, LogError, counted, unknown
 from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.findings import Finding, Findings, Kind
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.reader import Contents
-from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.schema import SchemaError, full_name
 from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
