@@ -24,7 +24,7 @@ COMMANDS = {
     "extract": "Turn MCAP logs into demonstrations.",
     "info": "Show what a file of demonstrations, a reward, metrics, a plan or a study holds.",
     "select": "Write some of the trials of a demonstrations file.",
-    "merge": "Write the trials of several demonstrations files into one.",
+    "merge": "Write the trials of several demonstrations files into one, or those of a folder with a manifest.",
     "relabel": "Give trials of a demonstrations file other labels, without extracting them again.",
     "fit": "Learn a navigation reward from demonstrations.",
     "models": "Compare rewards by how well they predict participants left out.",

@@ -190,7 +190,7 @@ def test_both_doors_write_the_options_and_a_report_shows_them(navirl):
     assert read_json(Path("b.json"), "reward")["options"] == kept
     usual = settings_document(ExtractSettings(), LoadOptions(), None, None)
     made = Made(
-        demos=SimpleNamespace(file="many/manifest.json"),
+        demos=(SimpleNamespace(file="many/manifest.json"),),
         reward=SimpleNamespace(file="a.json"),
         inputs=[SimpleNamespace(file=name) for name in ("p 1.mcap", "map.yaml", "t.csv")],
         settings={**usual, "map": "map.yaml", "trials": "t.csv", "wrench": False},

@@ -131,19 +131,9 @@ def of_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any
     if name not in names:
         raise ArtefactError(f"{path}: {unknown('person', name, names)}")
     own = content["population"]["persons"][names.index(name)]
-    parameters = [_merged(one, typical, own, path) for one, typical in _pairs(own, content, path)]
-    covariance = _square(own["covariance"], len(parameters), f"{path}: population/persons/{name}/covariance")
+    parameters, covariance = _own_parameters(own, content, path)
     varying = {one["name"] for one in content["population"]["parameters"]}
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    held = np.array([one["name"] not in varying for one in parameters])
-    covariance[held] = covariance[:, held] = errors[held] = np.nan
-    for one, error in zip(parameters, errors, strict=True):
-        one["standard_error"] = number(error)
     start = {one["name"]: one["value"] for one in content["parameters"]}
-    search = {
-        "log_likelihood": [own["log_likelihood_typical"], own["log_likelihood"]],
-        "theta": [list(start.values()), [one["value"] for one in parameters]],
-    }
     ends = [
         {key: one[key] for key in ("name", "lower", "upper")} for one in own["parameters"] if one["name"] in varying
     ]
@@ -162,12 +152,35 @@ def of_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any
         "participants": [name],
         "steps": own["steps"],
         "iterations": 1,
-        "search": search,
+        "search": {
+            "log_likelihood": [own["log_likelihood_typical"], own["log_likelihood"]],
+            "theta": [list(start.values()), [one["value"] for one in parameters]],
+        },
         "reach": None,
         "intervals": [
             {"method": Kind.POSTERIOR.value, "errors": Errors.MODEL.value, "level": LEVEL, "parameters": ends}
         ],
     }
+
+
+def _own_parameters(
+    own: Mapping[str, Any], content: Mapping[str, Any], path: str
+) -> tuple[list[dict[str, Any]], FloatArray]:
+    """A person's parameters in the form of a fit's, and their covariance; not known where people do not differ.
+
+    Raises:
+        ArtefactError: Names or sizes differ, or an interval ends below its start.
+    """
+    parameters = [_merged(one, typical, own, path) for one, typical in _pairs(own, content, path)]
+    where = f"{path}: population/persons/{own['name']}/covariance"
+    covariance = _square(own["covariance"], len(parameters), where)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    varying = {one["name"] for one in content["population"]["parameters"]}
+    held = np.array([one["name"] not in varying for one in parameters])
+    covariance[held] = covariance[:, held] = errors[held] = np.nan
+    for one, error in zip(parameters, errors, strict=True):
+        one["standard_error"] = number(error)
+    return parameters, covariance
 
 
 def for_person(content: Mapping[str, Any], name: str, path: str) -> dict[str, Any]:

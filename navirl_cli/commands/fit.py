@@ -177,11 +177,8 @@ def fit(
     kind = None if intervals is None else Kind(intervals)
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
-    files = [
-        *demos,
-        *([Path(initial)] if initial and "=" not in initial else []),
-        *([prior_file] if prior_file else []),
-    ]
+    named = [Path(initial)] if initial and "=" not in initial else []
+    files = [*demos, *named, *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
     given = _given(initial)
     if prior_file is None:

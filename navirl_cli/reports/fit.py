@@ -4,7 +4,7 @@ All of it is read from the content of a reward file, so that the page of ``navir
 """
 
 from collections.abc import Mapping, Sequence
-from math import inf, isfinite, isinf, nan
+from math import comb, inf, isfinite, isinf, nan
 from typing import Any
 
 import numpy as np
@@ -130,7 +130,7 @@ def interval_notes(content: Mapping[str, Any]) -> list[Block]:
     else:
         text = f"95 % intervals: {_BY[sets[0]['method']]}, {_OF[sets[0]['errors']].format(freedom=count - 1)}"
     if len(sets) > 1:
-        text += "; as if one person: the same for paths of one policy"
+        text += "; as if one person: the same for paths of one policy, too narrow where people differ"
     rough = approximate(content)
     return [Paragraph(f"{text}.{' ' + rough if rough else ''}")]
 
@@ -138,15 +138,34 @@ def interval_notes(content: Mapping[str, Any]) -> list[Block]:
 def approximate(content: Mapping[str, Any]) -> str:
     """Why the intervals in front are approximate. Empty where simulations found 92 to 98 % of them right."""
     sets = content.get("intervals", [])
-    count = len(content["participants"])
-    if sets and sets[0]["method"] == "posterior":
-        few = f" {count} participants say little about how people differ." if 1 < count < FEW else ""
+    if not sets:
+        return ""
+    return roughness(sets[0]["method"], sets[0]["errors"], len(content["participants"]), len(content["demonstrations"]))
+
+
+def roughness(method: str, errors: str, participants: int, demonstrations: int) -> str:
+    """Why intervals are approximate, in a sentence or two; empty where they are not.
+
+    Args:
+        method: A :class:`~navirl_cli.irl.intervals.Kind`.
+        errors: An :class:`~navirl_cli.irl.intervals.Errors`.
+        participants: Whose demonstrations these are.
+        demonstrations: That the reward was learnt from.
+    """
+    several = 1 < participants < FEW
+    if method == "posterior":
+        few = f" {participants} participants say little about how people differ." if several else ""
         return f"Approximate: in simulations 81 to 90 % of such intervals covered, rather than 95 %.{few}"
-    if sets and sets[0]["errors"] == "participant" and count < FEW:
-        return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
-    if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
-        people = " If people differ they are too narrow: so few say little about that." if 1 < count < FEW else ""
-        return f"Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %.{people}"
+    if errors == "participant" and participants < FEW:
+        return (
+            f"Approximate, too wide rather than too narrow: {participants} participants say little about how people "
+            "differ."
+        )
+    if errors == "model" and (several or demonstrations < FEW_DEMONSTRATIONS):
+        few = "with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %"
+        narrow = f"too narrow if people differ, about which {participants} say little"
+        why = [few] * (demonstrations < FEW_DEMONSTRATIONS) + [narrow] * several
+        return f"Approximate: {'; '.join(why)}."
     return ""
 
 
@@ -226,7 +245,30 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
         for one, identified in zip(content["parameters"], found["identified_draws"], strict=True)
         if identified < count
     ]
-    return [Paragraph(", ".join([f"Bootstrap: {count} draws of participants (seed {found['seed']})", *lost]) + ".")]
+    text = ", ".join([f"Bootstrap: {count} draws of {people(content)} (seed {found['seed']})", *lost])
+    return [Paragraph(" ".join([f"{text}.", *_rough_draws(content)]))]
+
+
+def _rough_draws(content: Mapping[str, Any]) -> list[str]:
+    """Why the intervals of a bootstrap are approximate."""
+    number, found = len(content["participants"]), content["bootstrap"]
+    why = []
+    if number < FEW:
+        distinct = comb(2 * number - 1, number)
+        few = f", of whom there are {distinct} different draws" if distinct < len(found["theta"]) else ""
+        why.append(f"Its intervals are approximate, too narrow rather than too wide: {number} people{few}.")
+    fixed = [
+        one["name"]
+        for one, known, draws in zip(
+            content["parameters"], found.get("accelerated", []), found["identified_draws"], strict=False
+        )
+        if draws and not known
+    ]
+    if fixed:
+        why.append(
+            f"No correction for acceleration in {', '.join(fixed)}: a fit without one participant does not identify it."
+        )
+    return why
 
 
 def profile_table(content: Mapping[str, Any]) -> list[Block]:

@@ -10,10 +10,11 @@ from navirl_cli.documents.tables import Cell, Column, Interval, Spread, Table
 from navirl_cli.evaluation.groups import mean_and_spread
 from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.irl.fit import Fit
+from navirl_cli.irl.intervals import Errors
 from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.reports.evaluation import DECIMALS
-from navirl_cli.reports.fit import interval_cell
+from navirl_cli.reports.fit import interval_cell, roughness
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import FIRST, SECOND, CycleFit, Learnt
 from navirl_cli.study.pipeline import PUBLISHED_DEMONSTRATIONS, PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
@@ -141,7 +142,22 @@ def intervals_table(study: Study) -> Table:
         Column("learnt_from", "learnt from"),
         *(Column(parameter.name, f"{parameter.name} {parameter.unit}".strip(), DECIMALS) for parameter in parameters),
     )
-    return Table(columns, tuple(rows), "95 % intervals, of several participants from the scatter between them.")
+    return Table(columns, tuple(rows), _note_on_intervals(study))
+
+
+def _note_on_intervals(study: Study) -> str:
+    """What the intervals come from, and where they are approximate."""
+    sets = [(found.fit, found.intervals[0]) for _, found in cycles(study) if found.intervals]
+    scattered = any(one.errors is Errors.PARTICIPANT for _, one in sets)
+    text = f"95 % intervals{', of several participants from the scatter between them' if scattered else ''}."
+    for whose, several in (("one participant", False), ("several", True)):
+        rough = {
+            roughness(one.kind, one.errors, fit.participants, fit.demonstrations)
+            for fit, one in sets
+            if (fit.participants > 1) is several
+        }
+        text += "".join(f" Those of {whose}: {why[0].lower()}{why[1:]}" for why in sorted(rough - {""}))
+    return text
 
 
 def closeness_table(study: Study) -> Table:
