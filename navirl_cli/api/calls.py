@@ -80,6 +80,7 @@ from navirl_cli.reports.extraction import published_notes
 from navirl_cli.reports.fit import cannot_learn, remarks
 from navirl_cli.reports.fit import warnings as fit_warnings
 from navirl_cli.reports.per_trial import write_per_trial
+from navirl_cli.reports.persons import ended
 
 
 def extract(
@@ -392,8 +393,8 @@ def fit(
         *fit_warnings(document),
     )
     reached = found.status in {Status.CONVERGED, Status.OPEN_INTERVAL}
-    ended = [] if reached else [f"fit: {found.status.value}: {found.status.advice}"]
-    _warn([*ended, *lost])
+    early = [] if reached else [f"fit: {found.status.value}: {ended(document)}"]
+    _warn([*early, *lost])
     return FittedReward.of(
         learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses
     )

@@ -20,7 +20,7 @@ from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
 from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
-from navirl_cli.reports.persons import person_blocks, person_warnings
+from navirl_cli.reports.persons import ended, person_blocks, person_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -48,7 +48,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
     """
     status = Status(content["status"])
     return [
-        Paragraph(f"Status: **{status.value}**: {status.advice}."),
+        Paragraph(f"Status: **{status.value}**: {ended(content)}."),
         parameter_table(content),
         *interval_notes(content),
         *person_blocks(content),
@@ -148,7 +148,7 @@ def approximate(content: Mapping[str, Any]) -> str:
     count = len(content["participants"])
     if sets and sets[0]["method"] == "posterior":
         few = f" {count} participants say little about how people differ." if 1 < count < FEW else ""
-        return f"Approximate: in simulations 81 to 90 % of such intervals covered, rather than 95 %.{few}"
+        return f"Approximate: in simulations 75 to 90 % of such intervals covered, rather than 95 %.{few}"
     if sets and sets[0]["errors"] == "participant" and count < FEW:
         return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
     if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
@@ -400,9 +400,8 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
         lines.append(
             f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
         )
-    ended = Status(content["status"])
-    if status and ended is not Status.CONVERGED:
-        lines.append(f"{ended.value}: {ended.advice}")
+    if status and content["status"] != Status.CONVERGED.value:
+        lines.append(f"{content['status']}: {ended(content)}")
     return lines
 
 

@@ -38,7 +38,7 @@ from navirl_cli.reports.fit import (
     warnings,
 )
 from navirl_cli.reports.made import Made, made_blocks
-from navirl_cli.reports.persons import person_blocks
+from navirl_cli.reports.persons import ended, person_blocks
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
@@ -126,7 +126,7 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
     return (
         f"{counted(len(demonstrations), 'demonstration')} of {everyone}, and a navigation reward learnt from "
         f"{len(learnt.demonstrations)} of them, of {people(content)}. "
-        f"The fit ended with the status **{learnt.status.value}**: {learnt.status.advice}."
+        f"The fit ended with the status **{learnt.status.value}**: {ended(content)}."
     )
 
 
