@@ -16,11 +16,11 @@ test: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -q -n auto --dist loadgroup
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The slow tests too, the installed wheel in an empty environment among them.
 test-all: $(STAMP)
-	$(BIN)/pytest -q -n auto --dist loadgroup -m "slow or not slow"
+	$(BIN)/pytest -q -n auto --dist loadfile --no-loadscope-reorder -m "slow or not slow"
 
 test-wheel: $(STAMP)
 	$(BIN)/pytest -q -m slow tests/test_wheel.py
@@ -30,8 +30,9 @@ test-floors:
 	rm -rf $(FLOORS)
 	$(PYTHON) -m venv $(FLOORS)
 	$(PYTHON) tests/floors.py > $(FLOORS)/constraints.txt
-	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[dev]'
-	$(FLOORS)/bin/pytest -q -n auto --dist loadgroup
+	$(FLOORS)/bin/python $(PIP) --constraint $(FLOORS)/constraints.txt --editable '.[cluster,pandas,remote,view]' \
+		hypothesis jsonschema 'moto[server]' pytest pytest-xdist
+	$(FLOORS)/bin/pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 # The site, in docs/_build/html; a warning is an error.
 docs: $(DOCS)

@@ -21,9 +21,9 @@ __version__ = "0.1.0"
 _HOMES = {
     "NavirlError": "navirl_cli.errors",
     "NavirlWarning": "navirl_cli.errors",
-    "evaluate": "navirl_cli.api.calls",
+    "evaluate": "navirl_cli.api.evaluating",
     "extract": "navirl_cli.api.calls",
-    "fit": "navirl_cli.api.calls",
+    "fit": "navirl_cli.api.fitting",
     "inspect": "navirl_cli.api.calls",
     "plot": "navirl_cli.api",
     "policy": "navirl_cli.api.calls",
@@ -33,7 +33,9 @@ _HOMES = {
 
 if TYPE_CHECKING:
     from navirl_cli.api import plot
-    from navirl_cli.api.calls import evaluate, extract, fit, inspect, policy
+    from navirl_cli.api.calls import extract, inspect, policy
+    from navirl_cli.api.evaluating import evaluate
+    from navirl_cli.api.fitting import fit
     from navirl_cli.api.given import read_demonstrations, read_reward
     from navirl_cli.errors import NavirlError, NavirlWarning
 else:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+#: Numbers of states in what is kept of thousands of scenes, in half of the memory.
+IndexArray = NDArray[np.int32]
 
 
 class ByContent:

@@ -8,15 +8,17 @@ import logging
 import os
 import pickle
 import platform
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, wait
 from contextlib import contextmanager
+from functools import partial
 from importlib.metadata import version
 from typing import Any, Final, TypeVar
 
 import navirl_cli
 from navirl_cli.errors import ArgumentError, MissingPackageError, NavirlError, WorkerLostError
 from navirl_cli.parallel import Local, Submit, sharing
+from navirl_cli.teams import Argument, Ask, Part, of_share
 
 #: A scheduler that does not answer within this time is not there, s.
 _TIMEOUT_S: Final = 10
@@ -42,6 +44,11 @@ class Held:
     def __init__(self, pickled: bytes, settings: Mapping[str, str]) -> None:
         os.environ.update(settings)
         self.function: Callable[[Any], Any] = pickle.loads(pickled)  # noqa: S301 - from the client, which chose the code
+        self._size = len(pickled)
+
+    def __sizeof__(self) -> int:
+        """Bytes that would travel: Dask leaves large data where they are."""
+        return self._size
 
 
 def run(held: Held, item: Any) -> Any:
@@ -68,9 +75,43 @@ class Cluster(Executor):
     @contextmanager
     def holding(self, function: Callable[[Item], Result], count: int) -> Iterator[tuple[Submit[Item, Result], int]]:
         """As in :class:`navirl_cli.parallel.Holding`."""
-        settings = {name: value for name, value in os.environ.items() if name.startswith(_SETTINGS)}
-        held = self._client.submit(Held, pickle.dumps(function), settings, pure=False)
+        held = self._client.submit(Held, pickle.dumps(function), _settings(), pure=False)
         yield lambda item: _explained(self._executor.submit(run, held, item)), min(count, _AHEAD)
+
+    @property
+    def size(self) -> int:
+        """As in :class:`navirl_cli.teams.Keeping`."""
+        return sum(self._client.nthreads().values())
+
+    @contextmanager
+    def keeping(
+        self, function: Callable[[Part, Argument], Result], shares: Sequence[Sequence[Part]]
+    ) -> Iterator[Ask[Argument, Result]]:
+        """As in :class:`navirl_cli.teams.Keeping`; the scheduler makes a share again when its worker is lost."""
+        seats = [address for address, threads in self._client.nthreads().items() for _ in range(threads)]
+        held = [
+            self._client.submit(
+                Held,
+                pickle.dumps(partial(of_share, function, share)),
+                _settings(),
+                pure=False,
+                workers=[seats[number % len(seats)]],
+                allow_other_workers=True,
+            )
+            for number, share in enumerate(shares)
+        ]
+
+        def ask(argument: Argument) -> list[Result]:
+            futures = [_explained(self._executor.submit(run, own, argument)) for own in held]
+            wait(futures)
+            return [result for future in futures for result in future.result()]
+
+        yield ask
+
+
+def _settings() -> dict[str, str]:
+    """Environment variables that hold for workers too."""
+    return {name: value for name, value in os.environ.items() if name.startswith(_SETTINGS)}
 
 
 def _explained(future: "Future[Result]") -> "Future[Result]":
@@ -117,7 +158,9 @@ def workers_of(workers: int | None, cluster: str | None) -> Iterator[Executor]:
         yield Local(workers)
         return
     if workers is not None:
-        raise ArgumentError("`workers` and `cluster` exclude each other: a scheduler has its own workers")
+        raise ArgumentError(
+            "`workers` and `cluster` exclude each other: a scheduler has its own workers; leave out `workers`"
+        )
     with connected(cluster) as executor:
         yield executor
 

@@ -5,7 +5,7 @@ line prints it and exits with 1, or with 3 where all trials were left out as cut
 keeps its traceback.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar, Final, cast
 
 #: Largest number of names that a message lists.
@@ -98,6 +98,25 @@ def joined(reasons: Iterable[str], prefix: str = "") -> str:
     return "; ".join(shown)
 
 
+def refuse_beside(why: str, given: Mapping[str, object], instead: str) -> None:
+    """Refuse arguments that exclude another one, naming those that were given and what to do.
+
+    Args:
+        why: The other argument, and why it excludes them.
+        given: The arguments by name, which words may follow, with their values; those that are false or empty were not
+            given.
+        instead: What else to do than to leave them out.
+
+    Raises:
+        ArgumentError: One was given.
+    """
+    words = [name.partition(" ") for name, value in given.items() if value]
+    names = [f"`{name}`{space}{rest}" for name, space, rest in words]
+    if names:
+        listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+        raise ArgumentError(f"{why}: leave out {listed}, or {instead}")
+
+
 def counted(number: int, what: str) -> str:
     """A number with its noun, as in "1 trial" and "2 trials".
 
@@ -106,6 +125,21 @@ def counted(number: int, what: str) -> str:
         what: The noun for one of them, whose plural ends with s.
     """
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+class Number(int):
+    """A number of things that chooses words by itself: ``f"{n} message{n:|s} {n:is|are} lost"``.
+
+    As a format, two words with a bar between them give the first for 1 and the second otherwise; an empty format gives
+    the digits.
+    """
+
+    def __format__(self, words: str) -> str:
+        """The digits, or one of two words."""
+        if "|" not in words:
+            return super().__format__(words)
+        one, _, several = words.partition("|")
+        return one if self == 1 else several
 
 
 def brief(value: object) -> str:

@@ -109,8 +109,8 @@ class Local(Executor):
         from concurrent.futures import ProcessPoolExecutor  # which imports multiprocessing
 
         share = max(1, cores() // workers)
-        context, begin = _context(), (function, share)
-        with ProcessPoolExecutor(workers, context, initializer=_Worker.listen, initargs=begin) as pool:
+        begin = (function, share)
+        with ProcessPoolExecutor(workers, context(), initializer=_Worker.listen, initargs=begin) as pool:
 
             def submit(item: Item) -> "Future[Result]":
                 with _no_interrupt():  # Python loses an interrupt that comes while a process forks
@@ -239,7 +239,7 @@ def _begun(submit: Submit[Item, Result], item: Item) -> "Future[Result]":
         return future
 
 
-def _context() -> Any:
+def context() -> Any:
     """How processes start: as Python likes, but not as a copy of this process where its threads would be missed."""
     from multiprocessing import get_all_start_methods, get_context
 

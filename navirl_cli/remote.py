@@ -27,6 +27,19 @@ _RETRIES_S: Final = (0.2, 0.8, 3.0)
 #: Further attempts of obstore for each request, and the time for all of them, s.
 _ATTEMPTS, _ATTEMPTS_S = 5, 60
 _TIMEOUT_S: Final = 60
+#: By scheme, the variables of credentials, and what makes requests to a public bucket go without.
+_CREDENTIALS: Final = {
+    "s3": ("AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY", "AWS_SKIP_SIGNATURE=true"),
+    "gs": ("GOOGLE_APPLICATION_CREDENTIALS, the file of an account", "GOOGLE_SKIP_SIGNATURE=true"),
+    "az": (
+        "AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY",
+        "AZURE_STORAGE_ACCOUNT_NAME and AZURE_SKIP_SIGNATURE=true",
+    ),
+}
+#: How obstore's errors say that there are no credentials (they ask the machine's own, in a cloud), and that they are
+#: not valid.
+_NONE_FOUND: Final = ("169.254.169.254", "metadata.google", "CredentialsNotLoaded", "Account must be specified")
+_NOT_VALID: Final = ("service account file", "Invalid Access Key", "DecodeCredentials", "OpenCredentials", "InvalidKey")
 
 T = TypeVar("T")
 
@@ -226,7 +239,7 @@ def _asked(path: Remote, ask: Callable[[], T]) -> T:
     for wait_s in (*_RETRIES_S, None):
         try:
             return ask()
-        except (LogError, FileNotFoundError):
+        except LogError:
             raise
         except Exception as error:  # noqa: BLE001 - obstore's errors have no common type but this
             if wait_s is None or not _may_pass(error):
@@ -250,11 +263,14 @@ def _refused(path: Remote, error: Exception) -> Exception:
         )
     if kind in {"NotFoundError", "FileNotFoundError"} or isinstance(error, FileNotFoundError):
         return FileNotFoundError(2, "the store has no such object", str(path))
-    if "169.254.169.254" in text or "metadata.google" in text or "CredentialsNotLoaded" in text:
+    names, public = _CREDENTIALS.get(path.address.partition("://")[0], ("", ""))
+    if names and any(part in text for part in _NONE_FOUND):
         return LogError(
-            f"{path}: expected credentials in the environment (such as AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY), "
-            "found none; set them, or AWS_SKIP_SIGNATURE=true for a public bucket"
+            f"{path}: expected credentials in the environment (such as {names}), found none; set them, or {public} for "
+            "a public bucket"
         )
+    if names and any(part in text for part in _NOT_VALID):
+        return LogError(f"{path}: expected valid credentials in {names}, found others; correct them")
     if kind in {"PermissionDeniedError", "UnauthenticatedError"} or re.search(r"\b40[13]\b", text):
         what = "the link may have expired" if "?" in path.address else "check the credentials in the environment"
         return LogError(f"{path}: expected the right to read it, found that the store refuses; {what}")

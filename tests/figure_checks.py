@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 
 from navirl_cli.figures.cells import DrawnCells
-from navirl_cli.figures.sheet import settle
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.style import house_style
 from navirl_cli.irl.scene import Scene
 

@@ -15,3 +15,10 @@ def copies(folder: Path, count: int) -> list[Path]:
         with open_log(SAMPLES[number % len(SAMPLES)]) as raw, path.open("wb") as target:
             write_with_metadata(raw, target, "copy", {"number": str(number)})
     return made
+
+
+def loaded(_):
+    """Import what an extraction needs, in a worker."""
+    import navirl_cli.demos.recordings
+
+    return navirl_cli.demos.recordings.__name__

@@ -3,7 +3,8 @@
 import numpy as np
 
 from navirl_cli.evaluation.lines import Lines
-from navirl_cli.evaluation.metrics import METRICS, Need, measure, missing_of
+from navirl_cli.evaluation.metric import Need, measure, missing_of
+from navirl_cli.evaluation.metrics import METRICS
 from navirl_cli.evaluation.motion import Drive
 
 

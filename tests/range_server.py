@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from hashlib import md5
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
+from urllib.parse import unquote
 
 
 @dataclass
@@ -24,6 +25,13 @@ class Store:
     asked: list[tuple[str, str, tuple[int, int] | None]] = field(default_factory=list)
     sent: int = 0
     url: str = ""
+    #: Hashes of objects, each with its object: of a gigabyte one takes seconds.
+    etags: dict[int, tuple[bytes, str]] = field(default_factory=dict)
+
+    def etag_of(self, data):
+        if id(data) not in self.etags:
+            self.etags[id(data)] = data, md5(data, usedforsecurity=False).hexdigest()
+        return self.etags[id(data)][1]
 
 
 @contextmanager
@@ -59,7 +67,7 @@ def serving(**objects):
 def answer(handler, store, *, body):
     found = re.fullmatch(r"bytes=(\d+)-(\d+)", handler.headers.get("Range", ""))
     store.asked.append((handler.command, handler.path, found and (int(found[1]), int(found[2]) + 1)))
-    path = handler.path.partition("?")[0]
+    path = unquote(handler.path.partition("?")[0])
     if store.replaced_after is not None and len(store.asked) > store.replaced_after:
         store.objects[path] = store.objects[path][:-1] + b"?"
     if store.refusal is not None or path not in store.objects or (body and store.busy):
@@ -75,7 +83,7 @@ def answer(handler, store, *, body):
     if found:
         handler.send_header("Content-Range", f"bytes {found[1]}-{int(found[1]) + len(part) - 1}/{len(data)}")
     handler.send_header("Content-Length", str(len(part)))
-    handler.send_header("ETag", f'"{md5(data, usedforsecurity=False).hexdigest()}"')
+    handler.send_header("ETag", f'"{store.etag_of(data)}"')
     handler.send_header("Last-Modified", "Mon, 01 Jan 2024 00:00:00 GMT")
     handler.send_header("Accept-Ranges", "bytes")
     handler.end_headers()

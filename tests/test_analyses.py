@@ -28,10 +28,14 @@ def evidence():
 @pytest.mark.parametrize(
     ("questions", "changes", "message"),
     [
-        (Questions(cross_validate=True), {"prior": True}, "`cross_validate` and `prior` exclude each other"),
-        (Questions(correct_bias=True), {"prior": True}, "`correct_bias` needs all steps and no prior"),
-        (Questions(correct_bias=True), {"steps": Steps.CONTACT}, "`correct_bias` needs all steps and no prior"),
-        (Questions(correct_bias=True, bootstrap=2), {}, "leave out `prior`, `steps`, `bootstrap`"),
+        (Questions(cross_validate=True), {"prior": True}, "may know: leave out `prior`, or `cross_validate`"),
+        (Questions(correct_bias=True), {"prior": True}, "without a prior: leave out `prior`, or `c"),
+        (Questions(correct_bias=True), {"steps": Steps.CONTACT}, "without a prior: leave out `steps`, or `c"),
+        (
+            Questions(correct_bias=True, bootstrap=2, profiles=("c0",)),
+            {},
+            "leave out `bootstrap` and `profile`, or ask for them",
+        ),
         (
             Questions(correct_bias=True),
             {"l2": 0.5},

@@ -352,7 +352,7 @@ def test_the_command_says_how_many_trials_have_labels(navirl, tmp_path, variants
     log.write_bytes(variants["zstd"].stored[:-40])
     (tmp_path / "trials.csv").write_text("start_s,cycle\n0,1\n")
     done = navirl("annotate", log, "trials.csv", "-o", "copy.mcap", code=3)
-    assert done.stdout == "copy.mcap: 1 of 1 trials labelled\n"
+    assert done.stdout == "copy.mcap: 1 of 1 trial labelled\n"
     done = navirl("annotate", log, "trials.csv", "-o", "copy.mcap", "--force", "--json", code=3)
     assert json.loads(done.stdout) == {"log": "copy.mcap", "trials": 1, "labelled": 1}
     assert "exists already" in navirl("annotate", log, "trials.csv", "-o", "copy.mcap", code=1).stderr

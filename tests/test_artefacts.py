@@ -245,7 +245,8 @@ def test_other_files_are_refused_by_what_they_are(tmp_path):
     log = tmp_path / "run.mcap"
     log.write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(
-        ArtefactError, match=r"run\.mcap: expected a JSON file .*logs become demonstrations by navirl extract"
+        ArtefactError,
+        match=r"run\.mcap: expected a JSON file .* found an MCAP log; navirl extract makes demonstrations",
     ):
         read_demonstrations(log)
     with pytest.raises(ArtefactError, match=r"none\.json: cannot be read: No such file"):

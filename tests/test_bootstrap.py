@@ -179,6 +179,7 @@ def test_draws_that_do_not_identify_a_parameter_are_left_out_of_its_errors():
     assert found.identified_draws[0] == len(found.theta) == 12
     assert 0 < found.identified_draws[2] < 12
     assert np.isnan(found.theta[:, 2]).sum() == 12 - found.identified_draws[2]
+    assert found.accelerated.tolist() == [True, True, False, False], "without p01 nobody meets anybody"
     told = found.theta[np.isfinite(found.theta[:, 2]), 2]
     assert found.standard_errors[2] == pytest.approx(told.std(ddof=1))
     lower, upper = found.interval()[:, 2]

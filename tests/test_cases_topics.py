@@ -20,7 +20,7 @@ READ = {
 }
 REFUSED = {
     "empty_schemas": "none of its 6 topics has a definition of its messages, so that nothing can be decoded",
-    "goal_frame_unknown": "no goal is left: 1 messages on /goal_pose left out: transform from 'world' to 'map'",
+    "goal_frame_unknown": "no goal is left: 1 message on /goal_pose left out: transform from 'world' to 'map'",
     "two_publishers_odom": "poses jump to and fro between two tracks 0.3",
 }
 

@@ -168,7 +168,7 @@ def test_a_bad_log_among_good_ones_is_left_out_with_exit_code_3(navirl, tmp_path
     assert [d["id"] for d in read_json(Path("demos.json"), "demonstrations")["demonstrations"]] == ["a/1"]
     other = log_with(tmp_path, "c.mcap", wrench_topics=())
     both = navirl("extract", bad, other, "-o", "other.json", code=1).stderr
-    assert both.startswith("navirl: none of the 2 logs can be used: 2 logs: no wrench: ")
+    assert both.startswith("navirl: none of 2 logs can be used: 2 logs: no wrench: ")
     assert both.count("no wrench") == 1
 
 
@@ -250,7 +250,7 @@ def test_fit_reports_and_writes_the_reward(navirl, work):
 
 
 def test_fit_starts_from_parameters_and_from_an_earlier_reward(navirl, work):
-    common = ("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "--json")
+    common = ("fit", work / "demos.json", "--condition", "force", "--cycle", "2", "--intervals", "wald", "--json")
     first = json.loads(navirl(*common, "-o", "a.json", "--init", "c0=-60,a_p=-8").stdout)
     assert first["initial"] == {"c0": -60.0, "a_g": -0.01, "a_p": -8.0, "sigma_p": 2.0}
     again = json.loads(navirl(*common, "-o", "b.json", "--init", "a.json").stdout)

@@ -244,7 +244,7 @@ SAID = {
     "recorder_step_back": r"the recorder's clock .* jumps by -40.00 s 9.0 s after",
     "recorder_step_forward_3s": r"the recorder's clock .* jumps by \+3.00 s 9.0 s after",
     "log_time_zero_9s": r"gives 632 times of receipt that cannot be true, such as 0;",
-    "log_time_max": r"gives 1 times of receipt that cannot be true, such as 18446744073709551615 ns;",
+    "log_time_max": r"gives 1 time of receipt that cannot be true, such as 18446744073709551615 ns;",
     "tf_clock_off_+3s": r"/tf .map -> odom. is stamped by another clock than /odom: \+3.000 s",
 }
 

@@ -22,7 +22,7 @@ AHEAD = (
     "run.mcap: /tf (map -> odom) is stamped 1.00 s ahead, as AMCL does by its transform_tolerance; it is used from its "
     "receipt on"
 )
-WILD = "run.mcap: 1 messages on {topic} have stamps more than 1 s off their clock; their times of receipt are used"
+WILD = "run.mcap: 1 message on {topic} has a stamp more than 1 s off its clock; its time of receipt is used"
 
 
 @pytest.fixture
@@ -236,7 +236,7 @@ def test_a_wild_time_of_receipt_moves_no_time(load, topic, receipt):
     log.messages[middle] = replace(log.messages[middle], log_time_ns=receipt)
     recording = load(log)
     (note,) = recording.notes
-    assert note.startswith("run.mcap: the recorder's clock gives 1 times of receipt that cannot be true, such as ")
+    assert note.startswith("run.mcap: the recorder's clock gives 1 time of receipt that cannot be true, such as ")
     assert recording.t_ns.tolist() == nav.unix(np.arange(160) / 20).tolist()
     assert recording.wrench.t_ns.tolist() == nav.unix(np.arange(800) / 100).tolist()
     check_aligned(recording, 1e-9, poses=160)
@@ -340,8 +340,8 @@ def test_messages_out_of_order_and_twice(load):
         log.messages.append(nav.Message(one.topic, one.typename, wrenches[at].log_time_ns, one.payload))
     recording = load(log)
     assert set(recording.notes) == {
-        "run.mcap: 1 messages on /wrench were received out of order; sorted by time",
-        "run.mcap: 1 messages on /wrench repeat the time of another; the first counts",
+        "run.mcap: 1 message on /wrench was received out of order; sorted by time",
+        "run.mcap: 1 message on /wrench repeats the time of another; the first counts",
     }
     assert recording.wrench.t_ns.tolist() == nav.unix(np.arange(2000) / 100).tolist()
     check_aligned(recording, 1e-9)
@@ -355,7 +355,7 @@ def test_of_equal_times_the_first_counts():
     assert first["fx"].tolist() == [1, 3, 0]
     assert [str(one) for one in (*late, *twice)] == [
         "2 messages on /t were received out of order; sorted by time",
-        "1 messages on /t repeat the time of another; the first counts",
+        "1 message on /t repeats the time of another; the first counts",
     ]
 
 

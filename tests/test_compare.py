@@ -27,7 +27,8 @@ from navirl_cli.evaluation.compare import (
 )
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import group_of
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS
 from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths, sampled_lines_m

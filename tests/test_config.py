@@ -7,8 +7,9 @@ import factories as make
 import pytest
 from command_line import commands
 
+import navirl_cli as navirl_python
 from navirl_cli.artefacts.demonstrations import demonstrations_document
-from navirl_cli.artefacts.store import write_json
+from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.commands.experiment import CONSTANTS
 
 LOG = Path(__file__).parent.parent / "sample_logs" / "p01.mcap"
@@ -64,7 +65,11 @@ def test_what_nothing_reads_is_refused(navirl, text, message):
 
 def test_wrong_values_are_refused_as_on_the_command_line(navirl):
     Path("navirl.toml").write_text("[select]\ncycle = ['two']")
-    assert "Invalid value for '--cycle': 'two'" in navirl("select", "a.json", "-o", "b.json", code=2).stderr
+    words = " ".join(navirl("select", "a.json", "-o", "b.json", code=2).stderr.split())
+    assert words.endswith("Invalid value for '--cycle': 'two' is not a valid integer. (navirl.toml)"), (
+        "and say from where"
+    )
+    assert "navirl.toml" not in navirl("select", "a.json", "-o", "b.json", "--cycle", "two", code=2).stderr
 
 
 def test_quiet_leaves_out_remarks_and_verbose_adds_lines(navirl):
@@ -79,3 +84,16 @@ def test_quiet_leaves_out_remarks_and_verbose_adds_lines(navirl):
     assert "navirl: evaluate 2 of 2\n" in lines
     assert "s of CPU\n" in lines
     assert "exclude each other" in navirl("select", "a.json", "-o", "d.json", "--quiet", "--verbose", code=2).stderr
+
+
+def test_python_does_not_read_the_settings_and_the_command_line_keeps_what_it_took(navirl):
+    ones = [make.demonstration(make.open_grid(8, 4), CELLS, number=number, cycle=number) for number in (1, 2)]
+    write_json(Path("a.json"), "demonstrations", demonstrations_document(ones, [], {}), force=False)
+    Path("navirl.toml").write_text("[fit]\ncycle = 2\nintervals = 'wald'\nterms = 'length'")
+    navirl("fit", "a.json", "-o", "r.json", "--l2", "0")
+    kept = read_json(Path("r.json"), "reward")
+    assert kept["options"] == ["--cycle", "2", "--intervals", "wald", "--l2", "0", "--terms", "length"]
+    assert kept["demonstrations"] == [ones[1].id]
+    Path("navirl.toml").write_text("nothing_reads_this = 1")
+    found = navirl_python.fit("a.json", terms="length", intervals="wald")
+    assert sorted(found.demonstrations) == [one.id for one in ones]

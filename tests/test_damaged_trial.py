@@ -130,7 +130,7 @@ def test_a_flipped_exponent_is_reported_and_not_passed_on(written, navirl, topic
     sound = load_recording(path)
     path.write_bytes(data)
     recording = load_recording(path)
-    reason = rf"1 messages on {topic} hold implausible values \(1 impossible, such as .*e[+-]\d+ (N|m)\); left out"
+    reason = rf"1 message on {topic} holds implausible values \(1 impossible, such as .*e[+-]\d+ (N|m)\); left out"
     (told,) = recording.damage
     assert re.fullmatch(rf"run\.mcap: {reason}", told)
     found, kept = (recording.wrench, sound.wrench) if topic == "/wrench" else (recording, sound)

@@ -7,8 +7,8 @@ from rosbags.interfaces import Nodetype
 
 from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.messages import decode
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.logs.messages.schema import parse_definition
 
 WRENCH_FIELDS = ("header.stamp", "header.frame_id", "wrench.force.x", "wrench.force.z", "wrench.torque.y")
 TF_FIELDS = tuple(
@@ -192,7 +192,7 @@ def test_one_message_that_does_not_decode_is_damage(tmp_path):
     messages[0] = forge.Message("/wrench", forge.WRENCH, messages[0].log_time_ns, messages[0].payload[:20])
     path = forge.forge(tmp_path / "run.mcap", messages)
     result = read(path, {"/wrench": WRENCH_FIELDS})
-    assert "1 of 30 messages of /wrench do not decode as geometry_msgs/msg/WrenchStamped and are lost" in str(
+    assert "1 of 30 messages of /wrench does not decode as geometry_msgs/msg/WrenchStamped and is lost" in str(
         result.damage[0]
     )
     assert np.array_equal(

@@ -24,6 +24,8 @@ SLOW = {
     "index.md",
     "nav2-study.md",
     "other-rewards.md",
+    "own-log.md",
+    "pandas.md",
     "plan.md",
     "persons.md",
     "published-study.md",

@@ -229,9 +229,11 @@ def test_names_in_tables_are_not_broken(page):
 
 def test_no_figure_leaves_half_of_a_sheet_empty(page):
     page.call("Emulation.setEmulatedMedia", media="print")
-    heights = page.run("[...document.querySelectorAll('figure img')].map(one => one.getBoundingClientRect().height)")
+    boxes = "[...document.querySelectorAll('figure img')].map(one => one.getBoundingClientRect())"
+    sizes = page.run(f"{boxes}.map(box => [box.width, box.height])")
     page.call("Emulation.setEmulatedMedia", media="")
-    assert max(heights) <= 105 / 25.4 * 96 + 1  # mm
+    assert max(height for _, height in sizes) <= 95 / 25.4 * 96 + 1  # mm
+    assert pytest.approx(sizes[0], abs=1) == [1400 / 300 * 96, 800 / 300 * 96], "as wide as on paper"
 
 
 def test_it_prints_on_a4(page):

@@ -98,7 +98,7 @@ def test_relabel_finds_the_trials_by_log_and_start(navirl):
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (["p.mcap,1,2.0,,joystick,,"], "found several ways to place the table's 1 rows on its 3 demonstrations"),
+        (["p.mcap,1,2.0,,joystick,,"], "found several ways to place the table's 1 row on its 3 demonstrations"),
         (["x.mcap,1,2.0,,joystick,,"], "expected rows of trials of p.mcap, found none"),
     ],
 )
@@ -140,6 +140,8 @@ def test_info_shows_what_a_file_holds_and_single_values(navirl):
     for (file, name), value in values.items():
         printed = navirl("info", file, "--field", name).stdout
         assert printed == "length_m\n" if value is None else json.loads(printed) == value
+    message = navirl("info", "r.json", "--field", "c0", code=2).stderr
+    assert "--field: expected dots between levels, found 'c0'; did you mean 'parameters.c0'?" in message
     message = navirl("info", "r.json", "--field", "parameters.c1", code=2).stderr
     assert "--field: expected one of 'c0', 'a_g', 'a_p', 'sigma_p', found 'c1'" in message
     Path("x.json").write_text('{"format": "navirl/log"}')

@@ -20,9 +20,6 @@ from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.evaluation.metrics import METRICS
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("evaluate_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 
 
@@ -247,6 +244,43 @@ def test_files_stand_in_one_table_and_their_groups_are_compared(navirl, work):
     words = ("evaluate", "a.json", "b.json", "--reward", work / "learnt.json", "--ranks")
     assert "--ranks needs one file of demonstrations" in navirl(*words, code=2).stderr
     assert "expected numbers from 0 to 1" in navirl("evaluate", "a.json", "--quantiles", "2", code=2).stderr
+
+
+def test_a_parquet_table_has_the_types_and_values_of_the_csv_whatever_it_holds(navirl, work):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    for cycle in ("1", "2"):
+        words = ("evaluate", work / "demos.json", "--cycle", cycle, "--metrics", "length_m,onset_m")
+        navirl(*words, "--per-trial", f"{cycle}.parquet")
+        navirl(*words, "--per-trial", f"{cycle}.csv")
+    navirl("evaluate", work / "demos.json", "--condition", "joystick", "--per-trial", "j.parquet")
+    tables = [parquet.read_table(f"{name}.parquet") for name in "12j"]
+    assert len({str(one.schema) for one in tables}) == 1, "a column without values keeps its type"
+    types = {field.name: str(field.type) for field in tables[0].schema}
+    assert (types.pop("cycle"), types.pop("value")) == ("int64", "double")
+    assert set(types.values()) == {"string"}
+    assert tables[2].column("cycle").null_count == len(tables[2]), "joystick trials have no cycle"
+    for name, table in zip("12", tables, strict=False):
+        rows = list(csv.DictReader(io.StringIO(Path(f"{name}.csv").read_text())))
+        assert [
+            {k: "" if v is None else v for k, v in one.items() if k not in {"cycle", "value"}}
+            for one in table.to_pylist()
+        ] == [{k: v for k, v in one.items() if k not in {"cycle", "value"}} for one in rows]
+        assert table.column("cycle").to_pylist() == [int(one["cycle"]) for one in rows]
+        assert table.column("value").to_pylist() == [float(one["value"]) if one["value"] else None for one in rows]
+    missing = [one for one in tables[0].to_pylist() if one["value"] is None]
+    assert missing
+    assert all(one["missing"] for one in missing)
+
+
+def test_a_parquet_table_needs_pyarrow_and_says_so_before_the_work(navirl, work, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    done = navirl("evaluate", work / "demos.json", "--per-trial", "t.parquet", code=1)
+    assert done.stdout == ""
+    assert done.stderr == (
+        "navirl: t.parquet: .parquet needs pyarrow, which is not installed; install it with: pip install "
+        "'navirl[parquet]', or write .csv\n"
+    )
+    assert not list(Path().iterdir())
 
 
 def test_learnt_paths_of_rewards_are_compared_in_each_group(navirl, work):

@@ -19,9 +19,6 @@ from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.terms import TERMS, registry
 from navirl_cli.reports import recommendation
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("every_term")
-
 SCENE = make.scene_on(make.open_grid(16, 12), [0, 5], [15, 5], [[0.8, 0.3]])
 OWN = Path(__file__).with_name("toy_term.py")
 EVERY = (*TERMS, "egg")
@@ -95,7 +92,7 @@ def test_fit_evaluate_and_python(run, term):
     assert view.value[tuple(SCENE.lattice.cells[SCENE.start][::-1])] == view.policy.value_by_cell()[SCENE.start]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NavirlWarning)  # some end on a bound
-        again = navirl_cli.fit(demos, terms=reward["terms"])
+        again = navirl_cli.fit(demos, terms=reward["terms"], intervals="wald")
     assert again.reward.theta == pytest.approx(learnt.reward.theta, rel=1e-6)
     assert again.reward.terms == learnt.reward.terms
     path = json.loads(run("plan", f"{term}.json", "--scene", "demos.json", "--json").stdout)["paths"][0]

@@ -9,8 +9,9 @@ from matplotlib.colors import to_hex
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.ground import window_around
+from navirl_cli.figures.layout import trim_height
 from navirl_cli.figures.paths import draw_paths
-from navirl_cli.figures.sheet import new_figure, trim_height
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 
 
@@ -107,7 +108,7 @@ def test_people_and_robot_are_drawn_to_scale_once():
     drawn = draw_paths(one_axes(), ones)
     assert [circle.center for circle in drawn.people] == [(0.0, 0.1), (1.0, -1.0)]
     assert {circle.radius for circle in drawn.people} == {0.25}
-    assert "person (line style of path)" in legend_texts(drawn.axes)
+    assert "person (outlined like its paths)" in legend_texts(drawn.axes)
     (robot,) = drawn.robots
     np.testing.assert_allclose(robot.center, ones[0].xy_m[0])
     assert robot.radius == 0.3

@@ -7,7 +7,8 @@ from figure_factory import PUBLISHED, one_axes, scene, scene_and_visits
 from matplotlib.colors import to_rgba
 
 from navirl_cli.figures.cells import LEAST_VISITS, REACH_M, draw_policy, draw_reward
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.layout import settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLUMN_IN, DPI, PAGE_IN
 
 #: A window so flat that its colour bar stands above it.

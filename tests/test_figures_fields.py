@@ -8,8 +8,8 @@ from matplotlib.colors import to_hex
 
 from navirl_cli.demos.grid import MOVES
 from navirl_cli.figures.actions import draw_actions
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.overlay import overlays_of
-from navirl_cli.figures.sheet import settle
 from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.values import draw_value
 from navirl_cli.irl.likelihood import policy_of

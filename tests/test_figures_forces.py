@@ -12,7 +12,8 @@ from matplotlib.colors import to_hex
 from navirl_cli.demos.demonstration import Condition, Contact
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.layout import settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 
 

@@ -11,8 +11,9 @@ from matplotlib.colors import to_hex, to_rgb
 from PIL import Image
 
 from navirl_cli.figures.cells import draw_policy, draw_reward
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.paths import draw_paths
-from navirl_cli.figures.sheet import new_figure, save_figure, settle
+from navirl_cli.figures.sheet import new_figure, save_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, DARK_COLOURS, DPI, LOOKS, colour_of, look, styled
 
 #: Least contrast of what is no text to its ground (WCAG 2.1, 1.4.11), and of text (1.4.3).

@@ -12,71 +12,67 @@ from navirl_cli.demos.demonstration import Condition
 from navirl_cli.figures.cells import LIKELY_VISITS, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.conditions import draw_path_panels
 from navirl_cli.figures.ground import CROPPED_M, cropped_to, inside
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.overlay import Overlay, alike
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.policies import draw_policy_and_reward
 from navirl_cli.figures.scale import length_m
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.solved import SolvedScene
 
 
 @pytest.mark.parametrize(
     ("width_m", "expected"),
-    [(0.9, 0.1), (2.6, 1.0), (8.0, 1.0), (12.0, 1.0), (13.0, 2.0), (60.0, 10.0), (900.0, 100.0), (1.2, 0.2)],
+    [
+        (0.9, 0.2),
+        (2.6, 0.5),
+        (4.0, 1.0),
+        (8.0, 1.0),
+        (12.0, 1.0),
+        (13.0, 2.0),
+        (60.0, 10.0),
+        (900.0, 200.0),
+        (1.2, 0.2),
+    ],
 )
 def test_a_scale_bar_is_one_metre_or_a_round_number_that_fits(width_m, expected):
     assert length_m(width_m) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("width_in", [COLUMN_IN, PAGE_IN])
-def test_the_scale_bar_is_to_scale_and_labelled_and_hides_no_path(width_in):
-    one = demonstration(aside_m=-1.2)
-    drawn = draw_paths(one_axes(width_in), [one])
+def test_the_scale_bar_is_to_scale_and_labelled_below_the_map(width_in):
+    drawn = draw_paths(one_axes(width_in), [demonstration(aside_m=-1.2)])
     settle(drawn.axes.figure)
     bar = drawn.marks.scale_bar
-    (x0, y0), (x1, y1) = bar.get_xydata()
-    assert (x1 - x0, y1 - y0) == pytest.approx((1.0, 0.0))
+    assert np.ptp(bar.get_xdata()) == pytest.approx(1.0)
+    assert max(bar.get_xdata()) == pytest.approx(drawn.axes.get_xlim()[1])
     (number,) = drawn.axes.texts
     assert number.get_text() == "1 m"
     drawn.axes.figure.draw_without_rendering()
-    number_box, map_box = number.get_window_extent(), drawn.axes.get_window_extent()
-    assert map_box.x0 < number_box.x0 < number_box.x1 < map_box.x1
-    assert map_box.y0 < number_box.y0 < number_box.y1 < map_box.y1
-    path = drawn.axes.transData.transform(one.xy_m)
-    assert not any(number_box.contains(x, y) for x, y in path)
-    assert np.abs(one.xy_m - bar.get_xydata().mean(axis=0)).max(axis=1).min() > 0.2
+    label = drawn.axes.xaxis.label.get_window_extent()
+    for mark in (number.get_window_extent(), bar.get_window_extent()):
+        assert mark.y1 < drawn.axes.bbox.y0
+        assert mark.x0 > label.x1
+        assert label.y0 < (mark.y0 + mark.y1) / 2 < label.y1
+    assert number.get_window_extent().x1 < bar.get_window_extent().x0
     assert bar.get_label() not in legend_texts(drawn.axes)
+    assert_no_overlap(drawn.axes.figure)
 
 
-def test_the_scale_bar_takes_the_corner_that_is_free():
-    def corner(*corners_m):
-        ones = [replace(demonstration(), xy_m=np.repeat(corners, [50, 51], 0)) for corners in corners_m]
-        drawn = draw_paths(one_axes(), ones, window_m=room().extent_m)
-        x, y = drawn.marks.scale_bar.get_xydata().mean(axis=0)
-        return bool(x > 0), bool(y > 0)
-
-    south, north, west = [(-3.9, -1.8), (3.9, -1.8)], [(-3.9, 1.8), (3.9, 1.8)], [(-3.7, -1.8), (-3.7, 1.9)]
-    assert corner(north) == (True, False)
-    assert corner(south) == (True, True)
-    assert corner([(3.7, -1.8), (3.7, 1.9)]) == (False, False)
-    assert corner(south, [(3.7, -1.8), (3.7, 1.9)]) == (False, True)
-    assert corner(south, west) == (True, True)
-
-
-def test_a_scale_bar_that_would_hide_something_is_left_out():
-    around = [(-3.9, y) for y in (-1.9, -1.8, 1.8, 1.9)]
-    ones = [replace(demonstration(), xy_m=np.linspace((x, y), (3.9, y), 101)) for x, y in around]
-    drawn = draw_paths(one_axes(), ones, window_m=room().extent_m)
+def test_a_scale_bar_without_room_beside_the_label_is_left_out():
+    _, axes = new_figure(COLUMN_IN, panels=3)
+    drawn = draw_paths(axes[0], [demonstration()])
     assert drawn.marks.scale_bar is None
     assert not drawn.axes.texts
 
 
-def test_a_scale_bar_hides_no_visited_cells():
-    a_scene = scene()
-    everywhere = np.where(a_scene.lattice.xy_m[:, 1] < 0.9, 0.1, 0.0)
-    drawn = draw_policy(one_axes(), a_scene, everywhere)
-    assert drawn.marks.scale_bar.get_xydata()[0, 1] > 1.0
+def test_maps_with_one_view_have_the_scale_bar_where_the_label_is():
+    _, axes = new_figure(PAGE_IN, panels=4, columns=2)
+    drawn = draw_path_panels(axes, [(name, [demonstration()]) for name in "abcd"])
+    shown = [one.marks.scale_bar.get_visible() for one in drawn.panels]
+    assert shown == [bool(panel.get_xlabel()) for panel in axes] == [False, False, True, True]
+    assert [[text.get_visible() for text in panel.texts] for panel in axes] == [[one] for one in shown]
 
 
 def test_a_goal_outside_of_the_map_is_an_arrow_at_its_border():
@@ -111,7 +107,7 @@ def test_people_at_different_places_have_the_line_style_of_their_paths():
     assert [one.center[0] for one in (first, second)] == [0.0, 1.0]
     assert first.get_linestyle() != second.get_linestyle()
     assert drawn.lines[0].get_linestyle() == "-"
-    assert "person (line style of path)" in legend_texts(drawn.axes)
+    assert "person (outlined like its paths)" in legend_texts(drawn.axes)
 
 
 def test_people_of_all_trials_and_paths_without_people_have_solid_lines():

@@ -15,7 +15,7 @@ from navirl_cli.artefacts.rewards import Analyses, reward_document
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.cli import cli
 from navirl_cli.errors import ArtefactError
-from navirl_cli.figures.profile import chosen_profiles, draw_profile, draw_profiles, symbol_of
+from navirl_cli.figures.profile import NARROWEST_IN, chosen_profiles, draw_profile, draw_profiles, symbol_of
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, house_style
 from navirl_cli.irl.evidence import evidence_of
@@ -128,7 +128,7 @@ def test_an_open_end_is_shaded_to_the_last_value_and_labelled_open():
     axes = drawn(cut)
     (band,) = axes.patches
     assert band.get_x() + band.get_width() == pytest.approx(cut.values[-1])
-    assert axes.get_title() == rf"$\sigma_p$ = 2 ({profile.lower:.3g} to open)"
+    assert axes.get_title() == rf"$\sigma_p$ = 2.00 ({profile.lower:.2f} to open)"
     both = drawn(part_of(cut, slice(2, None), lower=None))
     assert both.get_title().endswith("(open to open)")
 
@@ -138,11 +138,11 @@ def test_labels_name_symbol_unit_and_level():
     assert axes.get_xlabel() == r"$\sigma_p$ [1/m²]"
     assert axes.get_ylabel() == "relative log-likelihood [nats]"
     assert [text.get_text() for text in axes.texts] == ["95 %"]
-    assert axes.get_title() == rf"$\sigma_p$ = 2 ({2 - 0.98:.3g} to {2 + 0.98:.3g})"
+    assert axes.get_title() == rf"$\sigma_p$ = 2.00 ({2 - 0.98:.2f} to {2 + 0.98:.2f})"
     axes = drawn(parabola(-30.0, 3.0, "c0", 0.9), "1/m")
     assert axes.get_xlabel() == "$c_0$ [1/m]"
     assert axes.texts[0].get_text() == "90 %"
-    assert axes.get_title().startswith("$c_0$ = \N{MINUS SIGN}30 (\N{MINUS SIGN}34.9 to")
+    assert axes.get_title().startswith("$c_0$ = \N{MINUS SIGN}30.0 (\N{MINUS SIGN}34.9 to")
     assert drawn(parabola(name="a_p"), "").get_xlabel() == "$a_p$"
     assert drawn(parabola(name="beta"), "s").get_xlabel() == "beta [s]"
 
@@ -164,7 +164,7 @@ def test_a_curve_on_one_side_of_a_bound():
     left, right = axes.get_xlim()
     assert left < one.lower < 0.0
     assert right == pytest.approx(0.0, abs=1e-9)
-    assert axes.get_title() == f"$a_g$ = 0 ({one.lower:.3g} to open)".replace("-", "\N{MINUS SIGN}")
+    assert axes.get_title() == f"$a_g$ = 0.000 ({one.lower:.3f} to open)".replace("-", "\N{MINUS SIGN}")
 
 
 def test_a_flat_profile_is_refused():
@@ -207,11 +207,11 @@ def test_panels_are_of_one_size_and_low_enough_for_a_paper(count, width_in):
 def test_titles_side_by_side_have_two_lines():
     figure = laid_out("common", 4, PAGE_IN)
     titles = [axes.get_title() for axes in figure.axes]
-    assert titles[0] == "$\\sigma_p$ = 0.934\n(0.385 to 1.48)"
-    assert titles[1] == "$a_p$ = -6.67\n(-10 to -3.34)".replace("-", "\N{MINUS SIGN}")
+    assert titles[0] == "$\\sigma_p$ = 0.934\n(0.385 to 1.483)"
+    assert titles[1] == "$a_p$ = -6.67\n(-10.00 to -3.34)".replace("-", "\N{MINUS SIGN}")
     assert all(title.count("\n") == 1 for title in titles)
     (alone,) = laid_out("common", 1, COLUMN_IN).axes
-    assert alone.get_title() == "$\\sigma_p$ = 0.934 (0.385 to 1.48)"
+    assert alone.get_title() == "$\\sigma_p$ = 0.934 (0.385 to 1.483)"
     opened = sheet([part_of(common()[0], slice(0, 6), upper=None), common()[1]], COLUMN_IN).axes[0]
     assert opened.get_title() == "$\\sigma_p$ = 0.934\n(0.385 to open)"
 
@@ -254,18 +254,16 @@ def test_ticks_are_few(order, count, width_in):
 
 
 @pytest.mark.parametrize(
-    ("count", "width_in", "message"),
-    [
-        (3, COLUMN_IN, "3 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or name"),
-        (4, COLUMN_IN, "4 profiles side by side are not legible in 3.5 in: expected 2 at most; set `wide`, or name"),
-        (5, COLUMN_IN, "5 profiles side by side are not legible in 3.5 in: expected 2 at most; name"),
-        (5, PAGE_IN, "5 profiles side by side are not legible in 7.16 in: expected 4 at most; name"),
-    ],
+    ("count", "width_in", "rows"),
+    [(2, COLUMN_IN, 1), (3, COLUMN_IN, 2), (5, COLUMN_IN, 3), (4, PAGE_IN, 1), (5, PAGE_IN, 2)],
 )
-def test_more_profiles_than_fit_are_refused(count, width_in, message):
-    with pytest.raises(ArtefactError) as caught:
-        draw_profiles([*common(), parabola()][:count], UNITS, width_in)
-    assert str(caught.value) == f"{message} fewer with `parameter`"
+def test_profiles_that_do_not_fit_beside_each_other_are_in_rows(count, width_in, rows):
+    figure = draw_profiles([*common(), parabola()][:count], UNITS, width_in)
+    grid = figure.axes[0].get_subplotspec().get_gridspec()
+    assert (grid.nrows, len(figure.axes)) == (rows, count)
+    assert width_in / grid.ncols >= NARROWEST_IN
+    named = [bool(axes.get_ylabel()) for axes in figure.axes]
+    assert named == [number % grid.ncols == 0 for number in range(count)]
 
 
 def test_the_level_is_inside_the_panel_also_near_an_end():
@@ -318,10 +316,8 @@ def test_levels_without_an_interval_are_refused_by_the_schema(plot, level):
     assert f"reward at profiles/0/level: expected {expected}, found {level}\n" in result.stderr
 
 
-def test_the_command_refuses_too_many_profiles_for_a_column_and_draws_them_wide(plot):
-    result = plot(common())
-    assert result.exit_code == 1
-    assert result.stderr.endswith("; set --wide, or name fewer with --parameter\n")
+def test_the_command_draws_all_profiles_or_those_named(plot):
+    assert plot(common()).exit_code == 0
     assert plot(common(), "--wide").exit_code == 0
     name = common()[2].name
     assert plot(common(), "--parameter", name, "--parameter", common()[0].name).exit_code == 0

@@ -11,7 +11,7 @@ from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import AVOIDANCE, DRIVEN, LEARNT, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
 from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.figures.properties import PropertyBar, bars_of, draw_properties, height_for
+from navirl_cli.figures.properties import PropertyBar, bars_of, draw_properties, property_layout
 from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of
 
@@ -29,7 +29,7 @@ def bar(label="force, cycle 1", key="force, cycle 1", mean=(6.5, 0.5, 2.0), std=
 
 
 def properties(bars, width_in=PAGE_IN, *, as_bars=False):
-    figure, axes = new_figure(width_in, height_for(bars, width_in), panels=len(PAPER_METRICS))
+    figure, axes = new_figure(width_in, **property_layout(bars, width_in))
     return figure, draw_properties(axes, bars, as_bars=as_bars)
 
 

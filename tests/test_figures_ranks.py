@@ -7,8 +7,8 @@ from figure_factory import one_axes
 from scipy.stats import kstest
 
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.ranks import draw_ranks
-from navirl_cli.figures.sheet import settle
 from navirl_cli.figures.style import COLUMN_IN
 
 RANKS = np.array([0.7, 0.1, 0.4, 0.45])

@@ -7,7 +7,8 @@ import pytest
 from figure_checks import SIGHTS, lab, layouts
 from matplotlib.lines import Line2D
 
-from navirl_cli.figures.sheet import common_legend, new_figure, outer_labels, trim_height
+from navirl_cli.figures.layout import trim_height
+from navirl_cli.figures.sheet import common_legend, new_figure, outer_labels
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN, colour_of, level_colours
 
 

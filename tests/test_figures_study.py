@@ -15,8 +15,9 @@ from navirl_cli.errors import DemonstrationError, SceneError
 from navirl_cli.figures import times
 from navirl_cli.figures.cells import LEAST_VISITS, draw_reward
 from navirl_cli.figures.conditions import draw_path_panels
+from navirl_cli.figures.layout import settle
 from navirl_cli.figures.policies import draw_policy_and_reward
-from navirl_cli.figures.sheet import new_figure, settle
+from navirl_cli.figures.sheet import new_figure
 from navirl_cli.figures.style import COLOURS, COLUMN_IN, PAGE_IN
 from navirl_cli.irl.scene import scenes_of
 from navirl_cli.irl.solved import SolvedScene
@@ -59,7 +60,7 @@ def test_every_time_is_a_dot_above_its_modality_and_the_axis_starts_at_0():
 def test_medians_are_named_and_visible_beside_the_dots():
     _, drawn = completion({"force": FORCE_S, "joystick": JOYSTICK_S})
     for at, (number, values) in enumerate(zip(drawn.numbers, (FORCE_S, JOYSTICK_S), strict=True)):
-        assert number.get_text() == f"{np.median(values):.3g}"
+        assert number.get_text() == f"{np.median(values):.1f}"
         assert max(drawn.medians[at].get_xdata()) < min(drawn.dots[at].get_xdata())
 
 

@@ -130,8 +130,19 @@ def test_garbage_over_a_messages_length_in_a_chunk(path, variant):
     check(path, data, log.without([message]), *((*place, reason) for reason in reasons))
 
 
-@pytest.mark.parametrize("variant", ["zstd", "zstd, no summary", "unchecked", "unchecked, no summary"])
-@pytest.mark.parametrize("wrong", [-1000, -1, 1, 1000, 2**40])
+@pytest.mark.parametrize(
+    ("variant", "wrong"),
+    [
+        # each length of two files that differ in all, both signs of the others
+        pytest.param(
+            variant,
+            wrong,
+            marks=[] if variant in {"zstd, no summary", "unchecked"} or abs(wrong) == 1 else pytest.mark.slow,
+        )
+        for variant in ("zstd", "zstd, no summary", "unchecked", "unchecked, no summary")
+        for wrong in (-1000, -1, 1, 1000, 2**40)
+    ],
+)
 def test_a_wrong_chunk_length_is_corrected_by_the_chunks_own_head(path, variant, wrong):
     log = intact(variant)
     chunk = log.chunks[fewest(log)]

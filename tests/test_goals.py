@@ -73,7 +73,7 @@ def test_goals_that_were_not_reached_are_left_out_and_told(load, end):
     recording = load(*said, *([] if end is None else [statuses(12.0, (1, SUCCEEDED), (10, end))]))
     check(recording, [1.0], [0.8])
     assert recording.damage == (
-        f"run.mcap: 1 goals of {ACTION}status were not reached, and the action does not say where they are; left out",
+        f"run.mcap: 1 goal of {ACTION}status was not reached, and the action does not say where it is; left out",
     )
 
 
@@ -85,7 +85,7 @@ def test_goals_by_the_feedback_of_the_action(load, kind):
         *(feedback(second, 3, 5.0, kind) for second in np.arange(17.5, 19.0, 0.5)),
     )
     check(recording, [1.0, 10.0], [0.75, 1.65])
-    assert "1 goals of" in recording.damage[0]
+    assert "1 goal of" in recording.damage[0]
 
 
 def test_places_go_before_actions(load):

@@ -37,7 +37,9 @@ def study(tmp_path):
 
 def test_an_archive_and_a_folder_give_the_same_logs(navirl, study):
     result = navirl("import-study", "runs.tar.gz", "-o", "logs")
-    assert result.stderr == ""
+    assert result.stderr == (
+        "navirl: the study has no forces: extract needs --no-wrench for these logs; navirl study logs evaluates them\n"
+    )
     lines = result.stdout.splitlines()
     assert lines[0].split() == ["log", "trials", "course", "completed", "in", "size", "MB"]
     assert [line.split()[:2] for line in lines[1:]] == [["logs/p1.mcap", "10"], ["logs/p2.mcap", "10"]]
@@ -71,7 +73,8 @@ def test_what_is_lost_is_reported_and_the_rest_is_written(navirl, study):
     (study / "runs" / "p2" / "joystick_parcours_times.txt").unlink()
     result = navirl("import-study", "runs", "-o", "logs", code=3)
     assert sorted(path.name for path in (study / "logs").iterdir()) == ["p1.mcap", "p2.mcap"]
-    broken, missing, nothing = result.stderr.splitlines()
+    said, broken, missing, nothing = result.stderr.splitlines()
+    assert said.startswith("navirl: the study has no forces")
     assert broken == (
         "navirl: runs/p1/joystick_demos.pkl: expected only names that the published study needs, found os.system "
         "before byte 11; no code was run; download the file from its authors again"

@@ -44,6 +44,14 @@ def read(terminal):
         return b""
 
 
+@pytest.fixture(autouse=True)
+def heeded():
+    """Commands begin with Ctrl-C in force, also where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture(scope="module")
 def demos(tmp_path_factory):
     """Demonstrations of a sample log."""
@@ -52,17 +60,32 @@ def demos(tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("group", [True, False], ids=["from the terminal", "sent to the process"])
+COMMANDS = {
+    "extract": (("extract", *SAMPLES, "-o", "out/demos.json"), b"extract"),
+    "extract one log": (("extract", SAMPLES[0], "-o", "out/demos.json"), b"extract"),
+    "simulate": (("simulate", "--participants", "4", "-o", "out/new/logs"), b"simulate"),
+    "study while extracting": (("study", *SAMPLES, "-o", "out/study"), b"extract"),
+    "study while fitting": (("study", "demos.json", "-o", "out/study"), b"fit "),
+}
+#: Whether the worker processes are interrupted too. Every command and both ways in turn; the other pairs by hand.
+GROUPS = {True: "from the terminal", False: "sent to the process"}
+FAST = {
+    ("extract", True),
+    ("extract", False),
+    ("extract one log", True),
+    ("simulate", True),
+    ("study while extracting", False),
+    ("study while fitting", True),
+}
+
+
 @pytest.mark.parametrize(
-    ("words", "bar"),
+    ("words", "bar", "group"),
     [
-        (("extract", *SAMPLES, "-o", "out/demos.json"), b"extract"),
-        (("extract", SAMPLES[0], "-o", "out/demos.json"), b"extract"),
-        (("simulate", "--participants", "4", "-o", "out/new/logs"), b"simulate"),
-        (("study", *SAMPLES, "-o", "out/study"), b"extract"),
-        (("study", "demos.json", "-o", "out/study"), b"fit "),
+        pytest.param(*case, group, id=f"{name}, {sent}", marks=[] if (name, group) in FAST else pytest.mark.slow)
+        for name, case in COMMANDS.items()
+        for group, sent in GROUPS.items()
     ],
-    ids=["extract", "extract one log", "simulate", "study while extracting", "study while fitting"],
 )
 def test_an_interrupt_leaves_nothing_behind(tmp_path, monkeypatch, demos, words, bar, group):
     monkeypatch.chdir(tmp_path)

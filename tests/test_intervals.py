@@ -7,13 +7,14 @@ import factories as make
 import numpy as np
 import pytest
 
-from navirl_cli.irl import intervals as module
+from navirl_cli.irl import ends as module
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.intervals import Ends, Errors, Intervals, Kind, default_kind, intervals, quantile
 from navirl_cli.irl.objective import Objective
-from navirl_cli.irl.reward import Reward
+from navirl_cli.irl.reward import PAPER_TERMS, Reward
 from navirl_cli.irl.status import Status
+from navirl_cli.irl.terms import TERMS
 
 SCENE = make.scene_on(make.open_grid(14, 8), [0, 3], [13, 4], [[0.7, 0.4]])
 TRUTH = Reward((-32.0, -6.0, -4.0, 3.0))
@@ -65,7 +66,67 @@ def test_an_end_takes_few_evaluations_of_the_likelihood(evidence, found, monkeyp
     begun = made[0].evaluations
     intervals(evidence, replace(found, scanned=()), Kind.PROFILE)
     assert len(found.scanned) > 8
-    assert begun < made[1].evaluations < 40, "8 ends, and the profile; the scan of the fit spares a part"
+    assert begun < made[1].evaluations < 60, "8 ends and the profile; the scan of the fit spares a part"
+
+
+class Twin:
+    """The best likelihood at a value of a parameter, by L-BFGS-B from a grid of decays and along a fine one."""
+
+    def __init__(self, objective):
+        self.objective = objective
+        (self.decay, _), *_ = objective.scans()
+        self.grid = np.geomspace(0.001, 1000, 25)
+
+    def best(self, name=None, value=0.0):
+        number = None if name is None else [p.name for p in self.objective.initial.parameters].index(name)
+        if number is not None:
+            value = value / float(self.objective.scale[number])
+        start = self.objective.to_units(self.objective.initial.theta)
+        costly = np.where(np.arange(len(start)) == 0, -5.0, start)  # has a policy, whatever the decay
+        found = []
+        for x0, grid in ((start, self.grid), (costly, self.grid[::-1])):
+            x = x0
+            for decay in grid if number != self.decay else (value,):
+                x = self._climb(np.where(np.arange(len(x)) == self.decay, decay, x), {self.decay}, number, value)
+                found.append(x)
+        top = max(found, key=lambda one: self.objective.slope(one)[0])
+        return float(self.objective.slope(self._climb(top, set(), number, value))[0])
+
+    def _climb(self, x, held, number, value):
+        from scipy.optimize import minimize
+
+        low, high = (bound.copy() for bound in self.objective.bounds)
+        x = x if number is None else np.where(np.arange(len(x)) == number, value, x)
+        for j in held | ({number} - {None}):
+            low[j] = high[j] = x[j]
+
+        def downward(at):
+            value, gradient = self.objective.slope(np.clip(at, low, high))
+            return (1e6, gradient) if np.isinf(value) else (-value, -gradient)
+
+        options = {"maxiter": 300, "ftol": 1e-10, "gtol": 1e-6}
+        return minimize(downward, x, jac=True, bounds=np.stack([low, high], axis=1), options=options).x
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("terms", "seed"), [(PAPER_TERMS, 3), (PAPER_TERMS, 5), ((*PAPER_TERMS, TERMS["turn"]), 4)])
+def test_ends_of_few_paths_against_a_grid_of_decays(terms, seed):
+    truth = Reward((*TRUTH.theta, -1.0)[: len(Reward.named({}, terms).theta)], terms)
+    evidence = evidence_of(make.drawn(SCENE, truth, 2, seed=seed))
+    found = fit(evidence, Reward.named({}, terms))
+    (only,) = intervals(evidence, found, default_kind(found))
+    assert only.kind is Kind.PROFILE, "whatever the states"
+    twin = Twin(Objective.of(evidence, found.reward, 0.0, None))
+    top = twin.best()
+    for ends, parameter in zip(only.ends, found.reward.parameters, strict=True):
+        for side, end, bound in ((-1, ends.lower, parameter.lower), (1, ends.upper, parameter.upper)):
+            if end is None:
+                assert np.isinf(bound) or twin.best(ends.parameter, bound) - top > -1.95
+                continue
+            fall = twin.best(ends.parameter, end) - top
+            assert fall == pytest.approx(-1.9207, abs=0.03) or fall < -1e3, "or no policy exists beyond"
+            beyond = min(max(end + side * 0.2 * abs(end), parameter.lower), parameter.upper)
+            assert twin.best(ends.parameter, beyond) - top < -1.9207
 
 
 def test_wald_intervals_are_estimate_and_error(evidence, found):

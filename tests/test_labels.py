@@ -203,7 +203,7 @@ def test_cells_that_cannot_be_are_refused(table, column, cell, message):
     ("content", "message"),
     [
         ("trial,condition\n1,force\n", "found no column start_s but 'trial,condition'; name them so"),
-        ("start_s,conditon\n1,force\n", "found an unknown column 'conditon'; remove it"),
+        ("start_s,conditon\n1,force\n", "found an unknown column 'conditon'; name it condition, or remove it"),
         ("start_s\n", r"expected trials below the header, found none; add one line per trial"),
         ("start_s,people_m\n1,1,2\n", "expected 2 columns as in the header, found 3"),
         ("start_s,set\n1,Fl\xfcr\n".encode("latin1"), 'line 2: expected UTF-8, found the byte 0xfc; save it as "CSV'),

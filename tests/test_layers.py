@@ -14,7 +14,8 @@ ORDERS = {
         ["__init__", "arrays", "errors", "limits"],
         ["remote"],
         ["files", "parallel"],
-        ["documents", "cluster"],
+        ["documents", "teams"],
+        ["cluster"],
         ["logs"],
         ["demos"],
         ["irl"],
@@ -50,7 +51,7 @@ ORDERS = {
     ],
     "navirl_cli.logs.messages": [
         ["__init__", "schema", "single"],
-        ["layout"],
+        ["definitions", "layout"],
         ["decode", "writer"],
         ["packing"],
         ["series"],

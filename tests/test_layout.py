@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.messages import decode
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.layout import derive
-from navirl_cli.logs.messages.schema import Leaf, Schema, SchemaError, parse_definition
+from navirl_cli.logs.messages.schema import Leaf, Schema, SchemaError
 
 #: The encoders of a run of examples, of which each message uses one.
 WIRES = {

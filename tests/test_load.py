@@ -86,14 +86,14 @@ def test_people_and_goals_in_other_frames_come_into_the_maps(load):
 def test_people_in_an_unknown_frame_do_not_spoil_the_log(load):
     recording = load(people_frame="moon")
     (note,) = recording.damage
-    assert note.startswith("run.mcap: 1 places on /people left out: transform from 'moon' to 'map'")
+    assert note.startswith("run.mcap: 1 place on /people left out: transform from 'moon' to 'map'")
     assert recording.people == ()
 
 
 def test_goals_that_are_not_finite_are_left_out(load):
     recording = load(goals=((1.0, float("nan"), 0.0), (1.5, 4.0, 0.0)))
     assert len(recording.goal_t_ns) == 1
-    assert "1 messages on /goal_pose left out: its numbers are not finite" in recording.damage[0]
+    assert "1 message on /goal_pose left out: its numbers are not finite" in recording.damage[0]
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_a_log_of_which_something_is_lost_is_refused_where_that_is_asked(tmp_pat
     with pytest.raises(LogError) as caught:
         load_recording(path, LoadOptions(strict=True))
     assert str(caught.value) == (
-        "run.mcap: damaged, which `strict` refuses: run.mcap: 1 messages on /odom hold implausible values "
+        "run.mcap: damaged, which `strict` refuses: run.mcap: 1 message on /odom holds implausible values "
         "(1 not finite); left out; run.mcap: 2 messages on /wrench hold implausible values (2 not finite); "
         "left out"
     )

@@ -204,7 +204,7 @@ def test_one_map_that_cannot_be_used_among_others_is_listed(loaded, trial):
     log.add("/map", broken, forge.at(5))
     assert loaded(log).damage == (
         (
-            "run.mcap: 1 maps on /map cannot be used (expected cells of 0.001 to 100 m, found 0 m; record the map "
+            "run.mcap: 1 map on /map cannot be used (expected cells of 0.001 to 100 m, found 0 m; record the map "
             "again, or give it with `map`); left out"
         ),
     )

@@ -97,7 +97,7 @@ def test_a_map_whose_own_cells_are_turned(load):
     recording = load(message)
     assert recording.occupancy.origin_m == (-1.0, -2.0)
     assert recording.notes == (
-        "run.mcap: 1 maps on /map have an origin with a quaternion of zeros; taken as not rotated",
+        "run.mcap: 1 map on /map has an origin with a quaternion of zeros; taken as not rotated",
     )
     message.info.origin.orientation.w = -1.0
     assert load(message).occupancy.origin_m == (-1.0, -2.0)

@@ -9,7 +9,8 @@ import pytest
 from rosbags.typesys import get_types_from_msg
 
 from navirl_cli.logs.load import load_recording
-from navirl_cli.logs.messages.schema import SchemaError, parse_definition
+from navirl_cli.logs.messages.definitions import parse_definition
+from navirl_cli.logs.messages.schema import SchemaError
 from navirl_cli.logs.roles import topics
 from navirl_cli.logs.roles.message_types import MessageType
 

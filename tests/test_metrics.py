@@ -12,7 +12,8 @@ from path_values import line_values
 
 from navirl_cli.demos.lines import path_length_m
 from navirl_cli.evaluation.lines import LEAVES_M, Lines, area_between_m2, areas_m2, center_distance_m, onset_m
-from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS, Metric, Need, measure
+from navirl_cli.evaluation.metric import Metric, Need, measure
+from navirl_cli.evaluation.metrics import BY_NAME, METRICS, PAPER_METRICS
 
 NOMINAL, PERSON = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[6.0, 0.3]])
 STRAIGHT = np.array([[0.0, 0.0], [4.0, 0.0]])

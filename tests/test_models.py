@@ -109,6 +109,13 @@ class TestCommand:
         assert [row[1] for row in rows] == ["1", "3", "4"]
         for row, model in zip(rows, compared.models, strict=True):
             assert row[2:4] == [f"{model.fit.log_likelihood:.2f}", f"{compared.per_step(model):.4f}"]
+        first, *lines = result.stderr.splitlines()
+        assert first == "navirl: 3 models, each fitted 5 times: to all participants, and to all but each"
+        assert [line.partition(";")[0] for line in lines[:3]] == [
+            "navirl: fit 5 of 15: length",
+            "navirl: fit 10 of 15: length, personal-space",
+            "navirl: fit 15 of 15: length, deviation, personal-space",
+        ], "one line a model without a terminal, also for the paper's, which is added"
         gain = compared.difference(compared.models[0], compared.paper)
         assert rows[0][4:10] == [f"{gain.mean:.4f}", "±", f"{gain.standard_error:.4f}", str(gain.in_favour), "of", "4"]
         assert rows[2][4:] == ["-", "-", "converged"]
@@ -192,7 +199,13 @@ def study(tmp_path_factory):
 
 
 @needs_study
-@pytest.mark.parametrize(("condition", "names"), OPTIMA)
+@pytest.mark.parametrize(
+    ("condition", "names"),
+    [
+        pytest.param(*which, marks=pytest.mark.slow if which == ("joystick", f"{SATURATING},turn") else [])
+        for which in OPTIMA
+    ],
+)
 def test_optima_on_the_published_study(study, condition, names):
     value, theta = OPTIMA[condition, names]
     found = fit(study[condition], Reward.named({}, tuple(TERMS[name] for name in names.split(","))))

@@ -76,6 +76,37 @@ def test_time_in_zones_counts_standing_still():
     assert sum(found[f"{zone}_s"] for zone in ("intimate", "personal", "social", "public")) == pytest.approx(9.0)
 
 
+def test_time_in_zones_and_entries_follow_people_who_walk_against_a_twin_step_by_step():
+    rng = np.random.default_rng(5)
+    t = np.linspace(2.0, 14.0, 121)
+    tracks, radius = [], 0.2
+    for number in range(2):  # one is lost after 9 s, and stays where it was last seen
+        own = t[: 71 + 50 * number]
+        tracks.append(PersonTrack(f"{number}", own, np.cumsum(rng.normal(0, 0.12, (len(own), 2)), axis=0)))
+    people = [one.xy_m.mean(axis=0) for one in tracks]
+    line = np.stack([0.25 * (t - 8), 0.1 * np.sin(t)], axis=1)
+    found = values(replace(moving(line, t, people=people, robot_radius_m=radius), tracks=tuple(tracks)))
+    entries, times, before = (
+        dict.fromkeys(("intimate", "personal", "social"), 0),
+        dict.fromkeys(("intimate", "personal", "social"), 0.0),
+        set(),
+    )
+    for at in np.arange(2.005, 14.0, 0.01):
+        here = np.array([np.interp(at, t, axis) for axis in line.T])
+        away = min(np.hypot(*(here - [np.interp(at, one.t_s, axis) for axis in one.xy_m.T])) - radius for one in tracks)
+        within = {zone for zone, limit in (("intimate", 0.45), ("personal", 1.2), ("social", 3.6)) if away < limit}
+        for zone in within - before:
+            entries[zone] += 1
+        if within:
+            times[min(within, key=["intimate", "personal", "social"].index)] += 0.01
+        before = within
+    assert {zone: found[f"{zone}_intrusions"] for zone in entries} == entries
+    assert entries["personal"] > 1
+    for zone, time in times.items():
+        assert found[f"{zone}_s"] == pytest.approx(time, abs=0.1)
+        assert found[f"{zone}_time_share"] == pytest.approx(time / 12, abs=0.01)
+
+
 def test_short_trials_have_no_derivatives():
     found, missing = drive_values(
         moving(np.array([[0.0, 0.0], [0.3, 0.0]]), np.array([0.0, 0.9]), force_n=np.zeros((2, 2)))

@@ -37,14 +37,18 @@ def wait_for(condition, seconds=30):
     return False
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "terminated"])
+EXTRACT = ("extract", *SAMPLES, *SAMPLES, "-o", "demos.json")
+SIMULATE = ("simulate", "--participants", "6", "-o", "logs")
+
+
 @pytest.mark.parametrize(
-    "words",
+    ("words", "number"),
     [
-        ("extract", *SAMPLES, *SAMPLES, "-o", "demos.json"),
-        ("simulate", "--participants", "6", "-o", "logs"),
+        pytest.param(EXTRACT, signal.SIGKILL, id="extract killed"),
+        pytest.param(SIMULATE, signal.SIGTERM, id="simulate terminated"),
+        pytest.param(EXTRACT, signal.SIGTERM, id="extract terminated", marks=pytest.mark.slow),
+        pytest.param(SIMULATE, signal.SIGKILL, id="simulate killed", marks=pytest.mark.slow),
     ],
-    ids=["extract", "simulate"],
 )
 def test_workers_end_with_their_parent(tmp_path, words, number):
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}

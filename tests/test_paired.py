@@ -25,8 +25,15 @@ def test_only_who_has_both_counts():
     assert np.isnan(found.bootstrap).all()
 
 
-def test_wilcoxons_p_value_is_that_of_all_signs():
-    values = np.array([0.3, -0.1, 0.5, 0.7, 1.1, -0.2])
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.array([0.3, -0.1, 0.5, 0.7, 1.1, -0.2]),
+        np.array([0.25, 0.25, -0.25, 0.5, 0.5, 0.75]),  # ties
+        np.array([0.5, 0.5, 0.5]),
+    ],
+)
+def test_wilcoxons_p_value_is_that_of_all_signs(values):
     ranks = stats.rankdata(np.abs(values))
     plus = ranks[values > 0].sum()
     every = np.array([ranks[np.array(signs)].sum() for signs in product([False, True], repeat=len(values))])
@@ -44,6 +51,17 @@ def test_effect_sizes_and_mean():
     assert found.rank_biserial == pytest.approx(1.0)
     assert compare(-values).rank_biserial == pytest.approx(-1.0)
     assert compare(-values).mean == pytest.approx(-values.mean())
+
+
+def test_students_interval_and_the_effect_size_are_those_of_a_paired_t_test():
+    rng = np.random.default_rng(3)
+    one, other = rng.normal(1.0, 0.4, 9), rng.normal(0.7, 0.5, 9)
+    names = [f"p{k}" for k in range(9)]
+    found = paired(dict(zip(names, one, strict=True)), dict(zip(names, other, strict=True)))
+    test = stats.ttest_rel(one, other)
+    low, high = test.confidence_interval(0.95)
+    assert (found.student.lower, found.student.upper) == pytest.approx((low, high))
+    assert found.cohen_dz == pytest.approx(test.statistic / 3), "t is d_z times the root of n"
 
 
 def test_the_interval_covers_the_mean_about_as_often_as_it_says():

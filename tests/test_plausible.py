@@ -109,10 +109,10 @@ def test_odometry_and_tf_take_the_same_quaternions(length):
 @pytest.mark.parametrize(
     ("values", "report"),
     [
-        ({(3, 0): np.nan}, "1 messages on /ft hold implausible values (1 not finite); left out"),
+        ({(3, 0): np.nan}, "1 message on /ft holds implausible values (1 not finite); left out"),
         (
             {(3, 1): 2.6e-155},
-            "1 messages on /ft hold implausible values (1 impossible, such as 2.6e-155 N); left out",
+            "1 message on /ft holds implausible values (1 impossible, such as 2.6e-155 N); left out",
         ),
         (
             {(3, 1): -1e300, (5, 0): np.inf, (5, 1): 1e301, (9, 2): 2500.0},
@@ -186,9 +186,9 @@ def test_implausible_poses_people_and_goals_do_not_spoil_a_log(tmp_path, number)
     what = "not finite" if not np.isfinite(number) else f"impossible, such as {number:.3g} m"
     why = "are not finite" if not np.isfinite(far) else "cannot be true"
     assert recording.damage == (
-        f"run.mcap: 1 messages on /odom hold implausible values (1 {what}); left out",
-        f"run.mcap: 1 places on /people left out: its numbers {why}",
-        f"run.mcap: 1 messages on /goal_pose left out: its numbers {why}",
+        f"run.mcap: 1 message on /odom holds implausible values (1 {what}); left out",
+        f"run.mcap: 1 place on /people left out: its numbers {why}",
+        f"run.mcap: 1 message on /goal_pose left out: its numbers {why}",
     )
     assert len(recording.t_ns) == 120
     assert [track.name for track in recording.people] == ["bob"]

@@ -92,5 +92,5 @@ def test_one_person_is_no_population():
 
 def test_what_only_a_pooled_fit_answers_is_refused():
     for asked in ({"bootstrap": 10}, {"profiles": ("c0",)}, {"cross_validate": True}, {"correct_bias": True}):
-        with pytest.raises(ArgumentError, match="`pool` persons has its own intervals"):
+        with pytest.raises(ArgumentError, match="`pool` persons has intervals of its own and no prior: leave out "):
             Questions(pool=Pool.PERSONS, **asked).check_arguments(Steps.ALL, prior=False, l2=0.0)

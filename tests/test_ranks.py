@@ -183,7 +183,7 @@ def test_a_demonstration_that_fits_badly_is_named_with_its_ranks():
     line, chance = rank_lines(Ranking(ranks, trained=Trained(frozenset(), frozenset(), frozenset(["force"]))))
     assert line.startswith("this reward fits p1/1 (force) badly: 0.")
     assert "% pass people nearer" in line
-    assert chance == "of 1 demonstrations at most 0.0 would fit as badly by chance"
+    assert chance == "by chance alone, at most 0.03 of 1 demonstration would fit as badly"
     other = Ranking(ranks, trained=Trained(frozenset(), frozenset(), frozenset(["joystick"])))
     assert rank_lines(other) == ["the reward was not learnt from force: ranks there do not show how well it fits"]
     assert other.bad == []

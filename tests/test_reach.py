@@ -154,7 +154,5 @@ def test_a_stated_reach_that_changes_nothing_is_reported():
 
 def test_without_a_wrench_distances_may_be_too_small():
     (line,) = evidence_remarks([trial(contacts=None), trial(2)], [])
-    assert line.startswith(
-        "1 of 2 demonstrations have no wrench: where people pushed by hand, the learnt distances may"
-    )
+    assert line.startswith("1 of 2 demonstrations has no wrench: where people pushed by hand, the learnt distances may")
     assert evidence_remarks([trial(contacts=None, condition=Condition.JOYSTICK), trial(2)], []) == []

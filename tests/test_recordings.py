@@ -64,7 +64,7 @@ def test_when_all_fail_each_reason_is_told_once_with_its_count(tmp_path, count):
     with ThreadPoolExecutor(2) as pool, pytest.raises(NavirlError) as caught:
         extracted(*paths, broken, executor=pool)
     text = str(caught.value)
-    assert text.startswith(f"none of the {count + 1} logs can be used: {count} logs: no map: expected a topic of type ")
+    assert text.startswith(f"none of {count + 1} logs can be used: {count} logs: no map: expected a topic of type ")
     assert text.count("no map") == 1
     assert "broken.mcap: " in text
     assert len(text) < 1000

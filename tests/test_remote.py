@@ -1,8 +1,11 @@
 """Logs in object stores: only what is needed is fetched, and faults of networks change no result."""
 
 import json
+import os
 import pickle
+import re
 import urllib.request
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +21,10 @@ from navirl_cli.errors import LogError, MissingPackageError
 from navirl_cli.logs.container.log_file import LogFile
 from navirl_cli.logs.container.remote_file import RemoteFile, _joined
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.remote import Remote, path_of
+from navirl_cli.remote import Remote, _store, path_of
 
-pytest.importorskip("obstore", reason="needs navirl[remote]")
+#: Not imported before these tests run: beside obstore, processes do not begin as copies, and import everything anew.
+pytestmark = pytest.mark.skipif(find_spec("obstore") is None, reason="needs navirl[remote]")
 LOG = SAMPLES[0].read_bytes()
 
 
@@ -113,6 +117,79 @@ def test_a_refusal_names_its_remedy_and_no_secret(store, tmp_path, name, refusal
     assert "secret" not in said
 
 
+def test_a_missing_object_shows_no_query(store):
+    with pytest.raises(FileNotFoundError) as error:
+        path_of(f"{store.url}/none.mcap?sig=secret").stat()
+    assert "secret" not in str(error.value)
+    assert error.value.strerror == "the store has no such object"
+
+
+@pytest.fixture
+def clouds(monkeypatch, tmp_path):
+    """Buckets of Google and Azure on loopback, by what their libraries offer for emulators: no real store is asked."""
+    _store.cache_clear()
+    monkeypatch.setattr("navirl_cli.remote._allows_http", lambda _root: True)
+    monkeypatch.setattr("navirl_cli.remote._ATTEMPTS", 0)
+    with serving(**{f"{account}lab/p01.mcap": LOG for account in ("", "account/")}) as own:
+        account = {"gcs_base_url": own.url, "disable_oauth": True, "client_email": "", "private_key": "do-not-show"}
+        (tmp_path / "account.json").write_text(json.dumps({**account, "private_key_id": ""}))
+        for name, value in {
+            "GOOGLE_APPLICATION_CREDENTIALS": tmp_path / "account.json",
+            "GOOGLE_SERVICE_ACCOUNT": tmp_path / "account.json",
+            "AZURE_STORAGE_USE_EMULATOR": "true",
+            "AZURITE_BLOB_STORAGE_URL": own.url,
+            "AZURE_STORAGE_ACCOUNT_NAME": "account",
+        }.items():
+            monkeypatch.setenv(name, str(value))
+        yield own
+    _store.cache_clear()
+
+
+@pytest.mark.parametrize("scheme", ["gs", "az"])
+def test_buckets_of_google_and_azure_are_read_by_ranges(clouds, tmp_path, scheme):
+    run("extract", f"{scheme}://lab/p01.mcap", "-o", tmp_path / "there.json")
+    run("extract", SAMPLES[0], "-o", tmp_path / "here.json")
+    assert read_demonstrations(tmp_path / "there.json") == read_demonstrations(tmp_path / "here.json")
+    assert all(span for method, _, span in clouds.asked if method == "GET")
+    said = run("extract", f"{scheme}://lab/none.mcap", "-o", tmp_path / "x.json", code=1)
+    assert "found no file there; check the path" in said
+    clouds.refusal = 403
+    said = run("extract", f"{scheme}://lab/p01.mcap", "-o", tmp_path / "x.json", code=1)
+    assert "expected the right to read it, found that the store refuses; check the credentials" in said
+    assert "do-not-show" not in said
+
+
+@pytest.mark.parametrize(
+    ("address", "variable", "value", "message"),
+    [
+        (
+            "az://lab/p01.mcap",
+            "AZURE_STORAGE_ACCOUNT_KEY",
+            "do not show",
+            "expected valid credentials in AZURE_STORAGE",
+        ),
+        (
+            "gs://lab/p01.mcap",
+            "GOOGLE_SERVICE_ACCOUNT",
+            "do-not-show.json",
+            "expected valid credentials in GOOGLE_APPL",
+        ),
+        ("az://lab/p01.mcap", None, None, r"expected credentials .*AZURE_STORAGE_ACCOUNT_NAME .* found none; set them"),
+    ],
+)
+def test_wrong_credentials_name_their_variable_and_are_not_shown(monkeypatch, address, variable, value, message):
+    for name in list(os.environ):
+        if name.startswith(("AZURE", "GOOGLE")):
+            monkeypatch.delenv(name)
+    if variable is not None:
+        monkeypatch.setenv("AZURE_STORAGE_ACCOUNT_NAME", "account")
+        monkeypatch.setenv(variable, value)
+    _store.cache_clear()
+    with pytest.raises(LogError, match=message) as error:
+        path_of(address).stat()
+    assert "show" not in str(error.value)
+
+
 def test_a_manifest_does_not_ask_for_an_unchanged_object_again(store, tmp_path):
     words = ("extract", f"{store.url}/p01.mcap", "-o", f"{tmp_path / 'demos'}/")
     run(*words)
@@ -145,6 +222,31 @@ def test_chunks_of_cameras_are_not_fetched(tmp_path):
         assert len(found.columns["x"]) == 400
         assert store.sent < 1.3 * sum(chunks) + (1 << 18)
         assert store.sent < 0.2 * path.stat().st_size
+
+
+def test_a_large_log_is_inspected_by_its_summary(tmp_path):
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=400_000, compression=CompressionType.NONE)
+        writer.start()
+        small = writer.register_channel("/small", "json", writer.register_schema("S", "jsonschema", b"{}"))
+        for n in range(2001):
+            writer.add_message(small, n * 10**7, json.dumps({"x": "a" * 4000}).encode(), n * 10**7)
+        writer.finish()
+    with serving(**{"mixed.mcap": path.read_bytes()}) as store:
+        said = run("inspect", f"{store.url}/mixed.mcap")
+        assert len(store.asked) < 20
+        assert store.sent < 400_000
+        assert "only the summary was read" in said
+        assert re.search(r"/small +S +2001\n", said)
+        assert "20.0 s, 2001 messages" in said
+        brief = json.loads(run("inspect", f"{store.url}/mixed.mcap", "--json"))["logs"][0]
+        assert brief["summary_only"] is True
+        assert brief["demonstrations"] is brief["topics"][0]["gaps"] is None
+        full = json.loads(run("inspect", f"{store.url}/mixed.mcap", "--json", "--check"))["logs"][0]
+        assert full["summary_only"] is False
+        assert full["topics"][0]["gaps"] == 0
+    assert "only the summary" not in run("inspect", path)
 
 
 def test_a_compressed_object_is_read_as_a_whole(tmp_path):

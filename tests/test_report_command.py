@@ -20,9 +20,6 @@ from navirl_cli.evaluation.meaning import half_distance_m
 from navirl_cli.reports.made import changed_settings, selection_words
 from navirl_cli.reports.reward import in_words
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("report_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]
 
 
@@ -73,9 +70,7 @@ def test_it_says_in_front_how_to_drive(page):
 
 
 def test_it_holds_figures_trials_ranks_and_hashes(work, page):
-    assert (
-        page.count("data:image/png;base64,") == 10
-    )  # paths, policy wide and narrow, properties, profile; each in the dark
+    assert page.count("data:image/png;base64,") == 16  # paths, policy, properties, profile; dark, narrow, and both
     assert page.count("<picture>") == 4
     for number in range(1, 8):
         assert f"p01/{number}" in page
@@ -95,8 +90,8 @@ def test_it_says_how_it_was_made(page):
     )
     for command in (
         "navirl extract p01.mcap -o demos.json",
-        "navirl fit demos.json --cycle 2 -o reward.json",
-        "navirl report demos.json reward.json --all --samples 100 --seed 0 -o report.html",
+        "navirl fit demos.json --cycle 2 --profile c0 -o reward.json",
+        "navirl report demos.json reward.json --all --samples 100 -o report.html",
     ):
         assert f"<code>{command}</code>" in made
 
@@ -171,12 +166,12 @@ def test_refusals(navirl, work):
 @pytest.mark.parametrize(
     ("ends", "text"),
     [
-        ((0.4, 0.9), "0.4 to 0.9"),
-        ((-inf, 0.9), "less than 0.9"),
-        ((0.4, inf), "more than 0.4"),
-        ((6e-35, 0.9), "less than 0.9"),
+        ((0.4, 0.9), "0.400 to 0.900"),
+        ((-inf, 0.9), "less than 0.900"),
+        ((0.4, inf), "more than 0.400"),
+        ((6e-35, 0.9), "less than 0.900"),
         ((6e-35, inf), "the demonstrations set no range"),
-        ((-2.0, 0.9), "-2 to 0.9"),
+        ((-2.0, 0.9), "-2.000 to 0.900"),
     ],
 )
 def test_a_range_in_metres_is_in_words(ends, text):

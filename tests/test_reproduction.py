@@ -16,7 +16,7 @@ from navirl_cli.logs.load import Forces, LoadOptions, load_recording
 from navirl_cli.study.measures import rows_of
 
 PRESENT = (study_data.ROOT / "expected.json").is_file()
-pytestmark = [pytest.mark.skipif(not PRESENT, reason=study_data.REASON), pytest.mark.xdist_group("reproduction")]
+pytestmark = pytest.mark.skipif(not PRESENT, reason=study_data.REASON)
 EXPECTED = study_data.expected() if PRESENT else {"runs": {}}
 RUNS = sorted(EXPECTED["runs"])
 VECTORS = {"published": "theta_published_si", "study_initial": "theta_study_initial_si"}
@@ -34,16 +34,18 @@ GROUPS = {
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The folders of the imported logs and of the study made from them."""
+    """The folders of the imported logs and of the study made from them, without its figures."""
     from click.testing import CliRunner
 
     from navirl_cli.cli import cli
 
     folder = tmp_path_factory.mktemp("study")
     logs, out = folder / "logs", folder / "out"
-    for words in (["import-study", study_data.ROOT, "-o", logs], ["study", logs, "-o", out]):
-        result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
-        assert result.exit_code == 0, result.output
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("navirl_cli.figures.study.draw_study", lambda *_, **__: {})
+        for words in (["import-study", study_data.ROOT, "-o", logs], ["study", logs, "-o", out]):
+            result = CliRunner().invoke(cli, [str(word) for word in words], catch_exceptions=False)
+            assert result.exit_code == 0, result.output
     return logs, out
 
 
@@ -157,3 +159,10 @@ def test_times_and_forces_are_not_invented(written, extracted):
         assert {one.laid_out_m_s for one in extracted[run].demonstrations} == {0.4}
         assert {one.contacts for one in extracted[run].demonstrations} == {None}
     assert json.loads((written[1] / "demos.json").read_text())["demonstrations"][0]["contacts"] is None
+
+
+@pytest.mark.slow
+def test_all_figures_are_drawn(written, tmp_path, navirl):
+    navirl("study", written[0], "-o", tmp_path / "out")
+    drawn = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
+    assert {"fig2_completion_times", "fig3_paths", "fig5_replays", "fig7_properties"} <= drawn

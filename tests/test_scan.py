@@ -79,7 +79,7 @@ def wide():
 
 def slow_best(evidence, l2):
     """The best of climbs from a fine grid of decays, with every other parameter free."""
-    starts = [Reward((-50.0, -0.1, a_p, sigma)) for sigma in geometric(1e-3, 100.0, 21) for a_p in (-5.0, 1.0)]
+    starts = [Reward((-50.0, -0.1, a_p, sigma)) for sigma in geometric(1e-3, 100.0, 11) for a_p in (-5.0, 1.0)]
     return max(fit(evidence, start, l2, scan=False).objective for start in starts)
 
 

@@ -7,9 +7,10 @@ import log_factory as forge
 import numpy as np
 import pytest
 
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.layout import derive
 from navirl_cli.logs.messages.reader import read
-from navirl_cli.logs.messages.schema import DecodeError, JsonSchema, SchemaError, parse_definition
+from navirl_cli.logs.messages.schema import DecodeError, JsonSchema, SchemaError
 
 #: Chunks of a message each.
 TINY = {"chunk_size": 1}
@@ -153,14 +154,14 @@ def test_a_message_of_another_type_is_lost_and_counted(tmp_path, wrong, error):
     assert series.columns["t"].tolist() == [1_000_000_002] * 2
     assert series.columns["three"].tolist() == [[1.0, 2.0, 3.0]] * 2
     assert series.columns["all[].n"].tolist() == ["b"] * 2
-    assert re.match(rf"1 of 3 messages of /j do not decode as x/J and are lost \(.*{error}", note), note
+    assert re.match(rf"1 of 3 messages of /j does not decode as x/J and is lost \(.*{error}", note), note
 
 
 @pytest.mark.parametrize("path", ["values", "x.count", "y.real", "s.upper", "z.append"])
 def test_attributes_of_python_objects_are_not_fields(tmp_path, path):
     series, (note,) = read_json(tmp_path, [{"x": [1], "y": 2, "s": "a", "z": []}], path)
     assert len(series) == 0
-    assert f"all 1 messages of /j do not decode as x/J and are lost (no field '{path.split('.')[-1]}' of" in note
+    assert f"the only message of /j does not decode as x/J and is lost (no field '{path.split('.')[-1]}' of" in note
 
 
 def test_types_are_learnt_from_the_first_message_with_the_field(tmp_path):

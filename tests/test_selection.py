@@ -57,7 +57,7 @@ def test_an_unknown_intervention_is_not_treated_as_no_intervention():
 
 
 def test_an_empty_selection_is_refused():
-    with pytest.raises(DemonstrationError, match=r"^`cycle`: expected one of 'cycle 1', .*found 'cycle 7'"):
+    with pytest.raises(DemonstrationError, match=r"^`cycle`: expected one of '1', .*found '7'"):
         select(ALL, Subset(("force",), (7,)))
     with pytest.raises(
         DemonstrationError, match=r"^`condition` and `cycle`: expected one of 'f.* found 'joystick, cycle 1'"

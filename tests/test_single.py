@@ -84,7 +84,7 @@ def test_a_frame_that_cannot_be_decompressed_is_lost_alone(tmp_path, harm):
         assert result.damage == ()
         return
     (lost,) = result.damage
-    assert "1 of 200 messages of /wrench do not decode as geometry_msgs/msg/WrenchStamped and are lost" in lost.reason
+    assert "1 of 200 messages of /wrench does not decode as geometry_msgs/msg/WrenchStamped and is lost" in lost.reason
     assert len(result.series["/wrench"]) == 199
 
 

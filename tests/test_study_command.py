@@ -19,9 +19,6 @@ from navirl_cli.irl.fit import fit
 from navirl_cli.irl.reward import Reward
 from navirl_cli.reports.study import FIGURES
 
-#: One process has the files that all tests of the module share.
-pytestmark = pytest.mark.xdist_group("study_command")
-
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))
 ANSWERS = "participant,question,modality,answer\n" + "".join(
     f"p{k:02d},The robot was easy to guide,{modality},{1 + (k + shift) % 5}\n"
@@ -58,6 +55,20 @@ def test_all_is_written_and_no_more(written):
     expected = {"report.md", "report.html", "summary.json", "demos.json", "figures"}
     expected |= {f"figures/{name}.{extension}" for name in figures for extension in ("png", "pdf")}
     assert {str(path.relative_to(out)) for path in out.rglob("*")} == expected
+
+
+def test_the_page_has_every_figure_for_dark_and_for_narrow_screens(written):
+    page = (written[0] / "report.html").read_text()
+    pictures = re.findall(r"<picture>.*?</picture>", page, re.DOTALL)
+    assert len(pictures) == len(FIGURES) - 1  # the sample logs hold no obstacle course
+    narrow, dark = "(max-width: 599px)", "(prefers-color-scheme: dark)"
+    for one in pictures:
+        assert re.findall(r'media="([^"]*)"', one) == [
+            f"screen and {narrow} and {dark}",
+            f"screen and {narrow}",
+            f"screen and {dark}",
+        ]
+        assert len(set(re.findall(r"base64,[^\"]*", one))) == 4
 
 
 def test_participants_are_fitted_cycle_by_cycle(summary, demos):
@@ -129,7 +140,7 @@ def test_the_report_shows_every_figure(written):
     linked = re.findall(r"!\[.*?\]\((.*?)\)", (out / "report.md").read_text())
     assert sorted(linked) == sorted(f"figures/{path.name}" for path in (out / "figures").glob("*.png"))
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == len(linked)
+    assert page.count("data:image/png;base64,") == 4 * len(linked)  # dark, narrow, and both
     assert "://" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
 
 

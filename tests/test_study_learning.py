@@ -121,7 +121,7 @@ def test_what_a_reader_should_know():
         "trials are on 2 maps",
         "robots of radii 0.25, 0.4 m are combined",
         "cycle 3",
-        "1 trials of the condition force have neither cycle nor set",
+        "1 trial of the condition force has neither cycle nor set",
         "trials of the condition force in the sets slalom are not fitted, although they have a cycle",
         "the questionnaire holds answers of participants without a log",
     ]

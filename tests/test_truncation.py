@@ -20,7 +20,7 @@ from navirl_cli.irl.selection import select
 from navirl_cli.logs.load import LoadOptions, load_recording
 from navirl_cli.logs.overview import overview
 from navirl_cli.logs.sources import Source
-from navirl_cli.reports.fit import remarks
+from navirl_cli.reports.fit_remarks import remarks
 from navirl_cli.reports.repeated import repeated
 
 KEPT = ExtractSettings(keep_truncated=True)

@@ -4,14 +4,17 @@ import ast
 import re
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from command_line import option_names
 
 import navirl_cli
 from navirl_cli.cli import cli
+from navirl_cli.commands import shared
 from navirl_cli.commands.usage import as_options
-from navirl_cli.errors import nearest, unknown
+from navirl_cli.errors import Number, counted, nearest, unknown
+from navirl_cli.logs.findings import Kind
 
 SAMPLES = Path(__file__).parent.parent / "sample_logs"
 PACKAGE = Path(navirl_cli.__file__).parent
@@ -151,7 +154,6 @@ def test_the_message_for_an_unknown_name(what, name, known, message):
         (["extract", "p.mcap", "-o", "x.json", "--topic", "wrensh=/ft"], 2, "'wrench'"),
         (["extract", SAMPLES / "p01.mcap", "-o", "x.json", "--topic", "wrench=/wrensh"], 1, "'/wrench'"),
         (["fit", "{}/demos.json", "-o", "x.json", "--condition", "forse"], 2, "'force'"),
-        (["fit", "{}/demos.json", "-o", "x.json", "--cycle", "3"], 1, "'cycle 2' or 'cycle 1'"),
         (["fit", "{}/demos.json", "-o", "x.json", "--profile", "sigma"], 1, "'sigma_p'"),
         (["fit", "{}/demos.json", "-o", "x.json", "--init", "sigma=2"], 2, "'sigma_p'"),
         (["evaluate", "{}/demos.json", "--metrics", "lenght_m"], 2, "'length_m'"),
@@ -167,3 +169,31 @@ def test_near_names_are_proposed(navirl, work, words, code, near):
         "Did", "did"
     )
     assert not list(Path().iterdir())
+
+
+def test_lines_of_progress_estimate_the_time_that_is_left(monkeypatch, capsys):
+    clock = iter([0.0, 30.0, 60.0, 300.0, 330.0])
+    monkeypatch.setattr(shared, "monotonic", lambda: next(clock))
+    with click.Context(cli), shared.progress_bar("fit", 8, line_every=2) as update:
+        for done, word in ((1, "a"), (2, "b"), (4, ""), (8, "c")):
+            update(done, word)
+    assert capsys.readouterr().err.splitlines() == [
+        "navirl: fit 2 of 8: b; about 3 min left",
+        "navirl: fit 4 of 8; about 5 min left",
+        "navirl: fit 8 of 8: c",
+    ]
+
+
+def test_a_number_chooses_the_words_beside_it():
+    words = "{0} message{0:|s} {0:repeats|repeat} {0:its|their} time"
+    assert words.format(Number(1)) == "1 message repeats its time"
+    assert words.format(Number(0)) == "0 messages repeat their time"
+    assert f"{Number(7):03d} {counted(2, 'log')}" == "007 2 logs"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in Kind if "{count" in kind.sentence])
+def test_a_finding_agrees_with_its_number(kind):
+    given = {"about": "/x", "size": 0.5, "at_s": 1.0, "change": 0.0, "detail": "y"}
+    one, several = (kind.sentence.format(count=Number(number), **given) for number in (1, 2))
+    assert re.sub(r"\b[12]\b", "", one) != re.sub(r"\b[12]\b", "", several), "the same words for one and for several"
+    assert not re.search(r"\b1 (messages|poses|times|maps|updates|entries|goals|places)\b", one)

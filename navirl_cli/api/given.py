@@ -6,50 +6,49 @@ from typing import TypeAlias, TypeVar
 
 from navirl_cli.api.results import Demonstrations, FittedReward
 from navirl_cli.artefacts.demonstrations import demonstrations_of
-from navirl_cli.artefacts.demonstrations import read_demonstrations as read_all
-from navirl_cli.artefacts.manifest import inputs_of, manifest_path, read_manifest
+from navirl_cli.artefacts.joined import read_content
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
-from navirl_cli.artefacts.store import read_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, DemonstrationError
-from navirl_cli.files import MANIFEST, Input
+from navirl_cli.files import Input
 from navirl_cli.irl.reward import Reward
-from navirl_cli.reports.fit import warnings
+from navirl_cli.reports.fit_remarks import warnings
 
 PathLike: TypeAlias = str | Path
 #: A learnt reward, or values by the names of the parameters; the other parameters keep their initial values.
 AnyReward: TypeAlias = LearntReward | Reward | Mapping[str, float]
+#: Demonstrations, or the files and folders that hold them.
+Demos: TypeAlias = PathLike | Sequence[PathLike] | Sequence[Demonstration]
 Given = TypeVar("Given")
 
 
-def read_demonstrations(path: PathLike) -> Demonstrations:
-    """Read a demonstrations file, or a folder of them with a manifest.
+def read_demonstrations(*paths: PathLike) -> Demonstrations:
+    """Read demonstrations files, or folders of them with a manifest.
 
     Args:
-        path: As written by ``navirl extract`` or :meth:`Demonstrations.write`.
+        *paths: As written by ``navirl extract`` or :meth:`Demonstrations.write`; several are read as one.
 
     Returns:
         The trials.
 
     Raises:
-        NavirlError: The file is missing, is not a demonstrations file, or holds no demonstrations.
+        NavirlError: A file is missing or is not a demonstrations file, two trials have the same id, or there are none.
     """
-    path = Path(path)
-    if manifest_path(path).name == MANIFEST:
-        document = read_json(manifest_path(path), "manifest")
-        trials, inputs = read_all(path), inputs_of(read_manifest(path))
-    else:
-        document = read_json(path, "demonstrations")
-        trials, inputs = demonstrations_of(document, str(path)), [Input(**one) for one in document["inputs"]]
+    files = [Path(path) for path in paths]
+    if not files:
+        raise ArgumentError("`paths`: expected at least one file, found none")
+    document, _ = read_content(files)
+    trials = demonstrations_of(document, ", ".join(map(str, files)))
     if not trials:
-        raise DemonstrationError(f"{path}: holds no demonstrations")
+        raise DemonstrationError(f"{', '.join(map(str, files))}: holds no demonstrations")
+    inputs = [Input(**one) for one in document["inputs"]]
     return Demonstrations(
         trials,
-        inputs=inputs,
+        inputs=inputs if len(files) == 1 else [*inputs, *map(Input.of, files)],
         settings=document["settings"],
         notes=[f"{one.id}: {note}" for one in trials for note in one.notes],
         gain=document.get("gain"),
-        file=Input.of(path),
+        file=Input.of(files[0]) if len(files) == 1 else None,
     )
 
 
@@ -73,8 +72,8 @@ def read_reward(path: PathLike, person: str | None = None) -> FittedReward:
     return FittedReward.of(learnt_of(document, str(path)), content, notes=tuple(warnings(content)), file=Input.of(path))
 
 
-def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Demonstration]:
-    """Demonstrations; a file is read.
+def demonstrations_in(demos: Demos) -> Sequence[Demonstration]:
+    """Demonstrations; files are read.
 
     Raises:
         DemonstrationError: There are no demonstrations.
@@ -83,7 +82,9 @@ def demonstrations_in(demos: PathLike | Sequence[Demonstration]) -> Sequence[Dem
         return read_demonstrations(demos)
     if not demos:
         raise DemonstrationError("`demos`: expected at least one demonstration, found none")
-    return demos
+    if isinstance(demos[0], str | Path):
+        return read_demonstrations(*demos)
+    return demos  # type: ignore[return-value]
 
 
 def sources_behind(demos: Sequence[Demonstration]) -> Sequence[Input]:

@@ -5,17 +5,17 @@ pyplot: a notebook shows it at the end of the cell, ``matplotlib.pyplot.show()``
 the figure to that file and shows nothing. All functions take the options of :class:`PageOptions`.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
-from navirl_cli.api.arguments import one_of, subset_in, texts, within
-from navirl_cli.api.calls import policy as policy_in
-from navirl_cli.api.given import AnyReward, PathLike, demonstrations_in, learnt_in, of_one, reward_in
-from navirl_cli.api.results import ScenePolicy
+from navirl_cli.api.arguments import subset_in, texts, within
+from navirl_cli.api.given import AnyReward, Demos, PathLike, demonstrations_in, learnt_in, of_one, reward_in
+from navirl_cli.api.maps import actions, policy, reward, value
+from navirl_cli.api.page import PageOptions, drawn, own, width_in
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, ArtefactError
@@ -23,21 +23,14 @@ from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import LEARNT, compare
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import Trained, group_of, groups_named
-from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.ranks import by_group_and_training, check_to_rank, chosen_to_rank, ranks_of
-from navirl_cli.figures.actions import draw_actions
-from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
 from navirl_cli.figures.conditions import draw_path_panels, panels_of
 from navirl_cli.figures.convergence import ROW_IN, columns_for, draw_convergence
 from navirl_cli.figures.forces import draw_forces
-from navirl_cli.figures.overlay import driven, overlays_of
 from navirl_cli.figures.paths import draw_paths
 from navirl_cli.figures.profile import ASPECT, draw_profile
-from navirl_cli.figures.properties import bars_of, draw_properties, height_for
+from navirl_cli.figures.properties import bars_of, draw_properties, property_layout
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
-from navirl_cli.figures.sheet import check_target, new_figure, save_figure, trim_height
-from navirl_cli.figures.style import COLUMN_IN, FONTS, LOOKS, PAGE_IN, styled
-from navirl_cli.figures.values import draw_value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,23 +38,8 @@ if TYPE_CHECKING:
 __all__ = ["actions", "convergence", "forces", "paths", "policy", "profile", "properties", "ranks", "reward", "value"]
 
 
-class PageOptions(TypedDict, total=False):
-    """Options of every figure."""
-
-    #: Width of a page with two columns (7.16 in) instead of one column (3.5 in).
-    wide: bool
-    #: "paper", "screen" (twice the pixels) or "dark".
-    style: str
-    #: "sans", or "times" for letters like those of an IEEE paper.
-    font: str
-    #: File to write: .png, .pdf or .svg, with embedded fonts. The figure is then not shown.
-    output: PathLike | None
-    #: Replace an existing file.
-    force: bool
-
-
 def paths(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     *,
     condition: str | Collection[str] = (),
     cycle: int | Collection[int] = (),
@@ -76,7 +54,7 @@ def paths(
     """Draw all driven paths by condition, thicker where the person pushed (the paper's Fig. 3).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         condition: Only trials of these conditions, as of :func:`navirl_cli.fit`; so are cycle, set, participant and
             trial.
         cycle: Only trials of these cycles.
@@ -98,119 +76,12 @@ def paths(
     groups = [] if together or axes is not None else panels_of(demonstrations)
     if groups:
         shape = {"panels": len(groups), "columns": 2}
-        return _drawn(lambda panels: draw_path_panels(panels, groups, crop=crop), None, page, **shape)[0]
-    return _drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), _own(axes), page)[0]
-
-
-def policy(
-    reward: PathLike | AnyReward,
-    demonstration: Demonstration,
-    *,
-    person: str | None = None,
-    axes: "Axes | None" = None,
-    crop: bool = False,
-    overlay: str | Collection[str] = (),
-    samples: int = 20,
-    seed: int = 0,
-    demos: Sequence[Demonstration] = (),
-    **page: Unpack[PageOptions],
-) -> "Axes":
-    """Draw the expected visits of every cell under a policy (the paper's Fig. 8, left).
-
-    Args:
-        reward: A reward, its file, or values by name of parameter.
-        demonstration: Gives the map, the people, the start and the goal.
-        person: Take this person's own reward, of a reward fitted with ``pool="persons"``; the typical one by default.
-        axes: Axes to draw on; a new figure by default.
-        crop: Show only the surroundings of the likely paths.
-        overlay: Draw paths over the map: "demos" (in this scene by this participant), "all" (all of demos on this
-            map), "samples"; one or several.
-        samples: Number of paths sampled from the policy.
-        seed: The same seed gives the same paths.
-        demos: Demonstrations for the overlay. By default the given demonstration alone.
-        **page: As in :class:`PageOptions`.
-
-    Returns:
-        The axes.
-
-    Raises:
-        NavirlError: The scene has no policy under the reward, or the figure cannot be written.
-    """
-    view = policy_in(reward, demonstration, person=person)
-    options = _cells(view, crop, overlay, samples, seed, demos)
-    return _drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), _own(axes), page)[
-        0
-    ]
-
-
-def reward(
-    reward: PathLike | AnyReward,
-    demonstration: Demonstration,
-    *,
-    person: str | None = None,
-    axes: "Axes | None" = None,
-    crop: bool = False,
-    overlay: str | Collection[str] = (),
-    samples: int = 20,
-    seed: int = 0,
-    demos: Sequence[Demonstration] = (),
-    **page: Unpack[PageOptions],
-) -> "Axes":
-    """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration, person=person)
-    options = _cells(view, crop, overlay, samples, seed, demos)
-    by_cell = view.reward.by_cell(view.scene)
-    return _drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), _own(axes), page)[0]
-
-
-def value(
-    reward: PathLike | AnyReward,
-    demonstration: Demonstration,
-    *,
-    person: str | None = None,
-    axes: "Axes | None" = None,
-    crop: bool = False,
-    overlay: str | Collection[str] = (),
-    samples: int = 20,
-    seed: int = 0,
-    demos: Sequence[Demonstration] = (),
-    **page: Unpack[PageOptions],
-) -> "Axes":
-    """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration, person=person)
-    options = _cells(view, crop, overlay, samples, seed, demos)
-    return _drawn(
-        lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), _own(axes), page
-    )[0]
-
-
-def actions(
-    reward: PathLike | AnyReward,
-    demonstration: Demonstration,
-    *,
-    person: str | None = None,
-    axes: "Axes | None" = None,
-    crop: bool = False,
-    overlay: str | Collection[str] = (),
-    samples: int = 20,
-    seed: int = 0,
-    demos: Sequence[Demonstration] = (),
-    **page: Unpack[PageOptions],
-) -> "Axes":
-    """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
-    view = policy_in(reward, demonstration, person=person)
-    options = _cells(view, crop, overlay, samples, seed, demos)
-    return _drawn(
-        lambda panels: draw_actions(
-            panels[0], view.scene, view.policy.probability_by_cell(view.scene.start), **options
-        ),
-        _own(axes),
-        page,
-    )[0]
+        return drawn(lambda panels: draw_path_panels(panels, groups, crop=crop), None, page, **shape)[0]
+    return drawn(lambda panels: draw_paths(panels[0], demonstrations, crop=crop), own(axes), page)[0]
 
 
 def properties(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward | None = None,
     *,
     person: str | None = None,
@@ -228,7 +99,7 @@ def properties(
     """Draw length, distance and area of paths by condition, as points with intervals (the paper's Fig. 7).
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: Adds the learnt paths, for the groups from which it was learnt, or for all if these are unknown.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
@@ -250,7 +121,7 @@ def properties(
     """
     everyone = demonstrations_in(demos)
     if person is not None and reward is None:
-        raise ArgumentError("`person` goes with `reward`")
+        raise ArgumentError("`person` goes with `reward`: name one, or leave it out")
     reward = None if reward is None else of_one(reward, person)
     trained = [] if reward is None else [_trained(reward, everyone)]
     subset = subset_in(condition, cycle, set, participant, trial)
@@ -259,10 +130,8 @@ def properties(
     drawing = Precision(int(within("samples", samples, 2, 100_000)))
     result = compare(demonstrations, learnt, drawing, np.random.default_rng(seed))
     rows = bars_of(result.groups, _taught(reward, demonstrations))
-    panels, height_in = len(PAPER_METRICS), height_for(rows, _width_in(page))
-    return _drawn(
-        lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, panels=panels, height_in=height_in
-    )
+    layout = property_layout(rows, width_in(page))
+    return drawn(lambda axes: draw_properties(axes, rows, as_bars=bars), None, page, **layout)
 
 
 def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[PageOptions]) -> "list[Axes]":
@@ -279,11 +148,11 @@ def forces(demonstration: Demonstration, *, crop: bool = False, **page: Unpack[P
     Raises:
         NavirlError: The trial has no wrench, or the figure cannot be written.
     """
-    return _drawn(lambda axes: draw_forces(axes, demonstration, crop=crop), None, page, panels=2, columns=1)
+    return drawn(lambda axes: draw_forces(axes, demonstration, crop=crop), None, page, panels=2, columns=1)
 
 
 def ranks(
-    demos: PathLike | Sequence[Demonstration],
+    demos: Demos,
     reward: PathLike | AnyReward,
     *,
     person: str | None = None,
@@ -301,7 +170,7 @@ def ranks(
     """Draw the ranks of demonstrations among paths of the policy by group: uniform if the policy is right.
 
     Args:
-        demos: Demonstrations, or their file.
+        demos: Demonstrations, or their files.
         reward: A reward, its file, or values by name of parameter.
         person: As in :func:`policy`.
         condition: Only trials of these conditions, as of :func:`paths`; so are cycle, set, participant and trial.
@@ -335,7 +204,7 @@ def ranks(
         chosen, _ = chosen_to_rank(demonstrations, trained)
     found = ranks_of(chosen, parameters, samples, np.random.default_rng(seed), trained=trained)
     panels = by_group_and_training(found)
-    return _drawn(lambda axes: draw_rank_panels(axes, panels), None, page, **rank_layout(len(panels), _width_in(page)))
+    return drawn(lambda axes: draw_rank_panels(axes, panels), None, page, **rank_layout(len(panels), width_in(page)))
 
 
 def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) -> "list[Axes]":
@@ -355,8 +224,8 @@ def convergence(reward: PathLike | LearntReward, **page: Unpack[PageOptions]) ->
     search, parameters = learnt.search, learnt.reward.parameters
     if search is None:
         raise ArtefactError("reward: expected the iterations of its fit, found none; fit it again")
-    panels, columns = 1 + len(parameters), columns_for(_width_in(page))
-    return _drawn(
+    panels, columns = 1 + len(parameters), columns_for(width_in(page))
+    return drawn(
         lambda axes: draw_convergence(axes, search.log_likelihood, search.theta, parameters),
         None,
         page,
@@ -391,65 +260,8 @@ def profile(
             f"expected a parameter with a profile likelihood ({known}), found {name!r}; fit again with `profile`"
         )
     unit = next(parameter.unit for parameter in learnt.reward.parameters if parameter.name == name)
-    height_in = _width_in(page) * ASPECT
-    return _drawn(lambda panels: draw_profile(panels[0], found, unit), _own(axes), page, height_in=height_in)[0]
-
-
-def _own(axes: "Axes | None") -> "list[Axes] | None":
-    return None if axes is None else [axes]
-
-
-def _width_in(page: PageOptions) -> float:
-    """Width of one column or of a page of two, inches."""
-    return PAGE_IN if page.get("wide") else COLUMN_IN
-
-
-def _drawn(
-    draw: Callable[["list[Axes]"], object],
-    axes: "list[Axes] | None",
-    page: PageOptions,
-    *,
-    panels: int = 1,
-    columns: int | None = None,
-    height_in: float | None = None,
-) -> "list[Axes]":
-    """Draw on given axes, or on a new figure that is shown or written."""
-    output, style = page.get("output"), one_of(tuple(LOOKS), page.get("style", "paper"), "style")
-    font = one_of(tuple(FONTS), page.get("font", "sans"), "font")
-    if axes is not None and output is not None:
-        raise ArgumentError("`output` is for new figures: save the figure of your `axes` yourself")
-    if output is not None:
-        check_target(Path(output), force=page.get("force", False))
-    with styled(style, font):
-        if axes is not None:
-            draw(axes)
-            return axes
-        figure, axes = new_figure(_width_in(page), height_in, panels, columns, managed=output is None)
-        draw(axes)
-        if output is not None:
-            save_figure(figure, Path(output), force=page.get("force", False), trim=height_in is None)
-        elif height_in is None:
-            trim_height(figure)
-    return axes
-
-
-def _cells(
-    view: ScenePolicy,
-    crop: bool,
-    overlay: str | Collection[str],
-    samples: int,
-    seed: int,
-    demos: Sequence[Demonstration],
-) -> CellOptions:
-    """Common options of all figures of a scene; cropped figures have the same view."""
-    wanted = {one_of(("demos", "all", "samples"), one, "overlay") for one in texts(overlay)}
-    shown: Sequence[Demonstration] = ()
-    if wanted & {"demos", "all"}:
-        shown, _ = driven(demos or [view.demonstration], view.demonstration, everywhere="all" in wanted)
-    overlays = overlays_of(shown, view.sample(samples, seed=seed) if "samples" in wanted else ())
-    lines = [line for one in overlays for line in one.lines_m]
-    window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
-    return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}
+    height_in = width_in(page) * ASPECT
+    return drawn(lambda panels: draw_profile(panels[0], found, unit), own(axes), page, height_in=height_in)[0]
 
 
 def _trained(reward: PathLike | AnyReward, demonstrations: Sequence[Demonstration]) -> Trained | None:

@@ -20,7 +20,7 @@ from navirl_cli.documents.tables import ENDINGS, Format
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArgumentError, MissingPackageError, unknown
 from navirl_cli.evaluation.compare import Comparison
-from navirl_cli.evaluation.metrics import Metric
+from navirl_cli.evaluation.metric import Metric
 from navirl_cli.evaluation.paired import Paired
 from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.files import Input, check_writable
@@ -32,7 +32,8 @@ from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.values import Policy
 from navirl_cli.reports.evaluation import evaluation_text, write_evaluation
 from navirl_cli.reports.extraction import trial_table
-from navirl_cli.reports.fit import report, warnings
+from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit_remarks import warnings
 
 if TYPE_CHECKING:
     from pandas import DataFrame

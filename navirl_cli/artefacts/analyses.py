@@ -28,6 +28,7 @@ def bootstrap_document(found: "Bootstrap") -> dict[str, Any]:
         "lower": numbers(lower),
         "upper": numbers(upper),
         "interval": "bca",
+        "accelerated": found.accelerated.tolist(),
         "theta": numbers(found.theta),
     }
 

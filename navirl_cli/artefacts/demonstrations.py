@@ -10,7 +10,7 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.manifest import manifest_path, read_listed, read_manifest
-from navirl_cli.artefacts.store import read_json
+from navirl_cli.artefacts.store import no_garbage, read_json
 from navirl_cli.demos.demonstration import Condition, Contact, Demonstration, PersonTrack
 from navirl_cli.demos.grid import Grid
 from navirl_cli.errors import ArtefactError, DemonstrationError, NavirlError
@@ -25,8 +25,11 @@ if TYPE_CHECKING:  # commands that only read demonstrations need neither logs no
 _MOST = {"t_s": 1e6, "x_m": 1e8, "y_m": 1e8, "yaw_rad": 1e6, "force_x_n": 1e6, "force_y_n": 1e6}
 #: Decimals of metres, radians and newtons in files. No sensor resolves a micrometre.
 DECIMALS = 6
+#: Of seconds: clocks count nanoseconds.
+TIME_DECIMALS = 9
 
 
+@no_garbage()
 def demonstrations_document(
     demonstrations: Sequence[Demonstration], inputs: Sequence[Input], settings: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -48,7 +51,12 @@ def demonstrations_document(
 
 
 def settings_document(
-    settings: "ExtractSettings", options: "LoadOptions", map_file: Path | None, trials: Path | None
+    settings: "ExtractSettings",
+    options: "LoadOptions",
+    map_file: Path | None,
+    trials: Path | None,
+    *,
+    join: bool = False,
 ) -> dict[str, Any]:
     """The settings of an extraction.
 
@@ -57,6 +65,7 @@ def settings_document(
         options: The user's choices about the logs.
         map_file: The map in place of the log's.
         trials: The table of labels.
+        join: Whether the logs are one recording.
     """
     from navirl_cli.logs.load import Forces
 
@@ -68,6 +77,8 @@ def settings_document(
         "wrench_frame": options.wrench_frame,
         "force_scale": options.force_scale,
         "wrench": options.forces is not Forces.IGNORED,
+        "strict": options.strict,
+        "join": join,
         "map": None if map_file is None else map_file.name,
         "trials": None if trials is None else trials.name,
     }
@@ -103,6 +114,7 @@ def read_demonstrations(path: Path) -> list[Demonstration]:
     return read_listed(listing, contents)
 
 
+@no_garbage()
 def demonstrations_of(
     document: Mapping[str, Any], path: str, known: dict[str, Grid] | None = None
 ) -> list[Demonstration]:
@@ -128,8 +140,9 @@ def demonstrations_of(
     return found
 
 
-def _rounded(values: FloatArray) -> list[float]:
-    return [float(value) for value in np.round(values, DECIMALS)]
+def _rounded(values: FloatArray, decimals: int = DECIMALS) -> list[float]:
+    found: list[float] = np.round(values, decimals).tolist()
+    return found
 
 
 def _written(demonstration: Demonstration) -> dict[str, Any]:
@@ -143,7 +156,7 @@ def _written(demonstration: Demonstration) -> dict[str, Any]:
         "cycle": d.cycle,
         "log": d.log,
         "start_ns": d.start_ns,
-        "t_s": [round(float(t), 9) for t in d.t_s],
+        "t_s": _rounded(d.t_s, TIME_DECIMALS),
         "x_m": _rounded(d.xy_m[:, 0]),
         "y_m": _rounded(d.xy_m[:, 1]),
         "yaw_rad": _rounded(d.yaw_rad),
@@ -180,7 +193,7 @@ def _track_written(track: PersonTrack) -> dict[str, Any]:
     return {
         "name": track.name,
         "spread_m": round(track.spread_m, DECIMALS),
-        "t_s": [round(float(t), 9) for t in track.t_s],
+        "t_s": _rounded(track.t_s, TIME_DECIMALS),
         "x_m": _rounded(track.xy_m[:, 0]),
         "y_m": _rounded(track.xy_m[:, 1]),
     }

@@ -17,7 +17,7 @@ def some_of(document: Mapping[str, Any], ids: Collection[str]) -> dict[str, Any]
     kept = [one for one in document["demonstrations"] if one["id"] in ids]
     used = {one["map"] for one in kept}
     maps = {digest: content for digest, content in document["maps"].items() if digest in used}
-    return {**_plain(document), "maps": maps, "demonstrations": kept}
+    return {**plain(document), "maps": maps, "demonstrations": kept}
 
 
 def merged(documents: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], list[str]]:
@@ -33,14 +33,7 @@ def merged(documents: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], 
     Raises:
         DemonstrationError: Two trials have the same id.
     """
-    owners: dict[str, str] = {}
-    for name, document in documents.items():
-        for one in document["demonstrations"]:
-            if (other := owners.setdefault(one["id"], name)) is not name:
-                raise DemonstrationError(
-                    f"{name}: expected other trials than {other}, found {one['id']} in both; leave it out with select, "
-                    "or give its participant another name with relabel"
-                )
+    refuse_twice({name: [one["id"] for one in document["demonstrations"]] for name, document in documents.items()})
     own = list(documents.values())
     inputs = {(one["file"], one["sha256"]): one for document in own for one in document["inputs"]}
     settings, notes = _common([document["settings"] for document in own])
@@ -56,6 +49,25 @@ def merged(documents: Mapping[str, Mapping[str, Any]]) -> tuple[dict[str, Any], 
     elif gains[0] is not None:
         content["gain"] = gains[0]
     return content, notes
+
+
+def refuse_twice(ids: Mapping[str, Sequence[str]]) -> None:
+    """Refuse trials that are in two files.
+
+    Args:
+        ids: By the name of the file.
+
+    Raises:
+        DemonstrationError: Two trials have the same id.
+    """
+    owners: dict[str, str] = {}
+    for name, own in ids.items():
+        for one in own:
+            if (other := owners.setdefault(one, name)) is not name:
+                raise DemonstrationError(
+                    f"{name}: expected other trials than {other}, found {one} in both; leave it out with select, give "
+                    "its participant another name with relabel, or name a folder in place of the files in it"
+                )
 
 
 def _common(settings: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], list[str]]:
@@ -75,9 +87,9 @@ def relabelled(document: Mapping[str, Any], demonstrations: Sequence[Demonstrati
     for entry, one in zip(document["demonstrations"], demonstrations, strict=True):
         labels = {"id": one.id, "participant": one.participant, "condition": one.condition.value}
         found.append({**entry, **labels, "cycle": one.cycle, "set": one.set})
-    return {**_plain(document), "demonstrations": found}
+    return {**plain(document), "demonstrations": found}
 
 
-def _plain(document: Mapping[str, Any]) -> dict[str, Any]:
+def plain(document: Mapping[str, Any]) -> dict[str, Any]:
     """The content without format and version, which writing adds."""
     return {key: value for key, value in document.items() if key not in {"format", "version", "navirl"}}

@@ -101,15 +101,24 @@ def read_listed(path: Path, contents: Sequence[tuple[Entry, Sequence[Demonstrati
     before: Counter[str] = Counter()
     found = []
     for entry, demonstrations in contents:
-        people = {one.participant for one in demonstrations}
-        found += [
-            replace(one, id=f"{one.participant}/{before[one.participant] + int(one.id.rpartition('/')[2])}")
-            for one in demonstrations
-        ]
-        before.update(dict.fromkeys(people, entry.trials))
+        ids = numbered(entry, [(one.participant, one.id) for one in demonstrations], before)
+        found += [replace(one, id=name) for one, name in zip(demonstrations, ids, strict=True)]
     if not found:
         raise ArtefactError(f"{path}: expected logs with demonstrations, found none among {len(contents)}")
     return found
+
+
+def numbered(entry: Entry, trials: Sequence[tuple[str, str]], before: Counter[str]) -> list[str]:
+    """Ids of the trials of a file, numbered after those of the files before it.
+
+    Args:
+        entry: The log.
+        trials: Participant and id in the file of each.
+        before: Number of trials by participant so far, skipped ones included; those of the log are added.
+    """
+    ids = [f"{participant}/{before[participant] + int(name.rpartition('/')[2])}" for participant, name in trials]
+    before.update(dict.fromkeys({participant for participant, _ in trials}, entry.trials))
+    return ids
 
 
 def hash_of(data: bytes) -> str:

@@ -20,7 +20,7 @@ from navirl_cli.artefacts.store import as_bytes
 from navirl_cli.demos.extract import ExtractSettings, numbered
 from navirl_cli.demos.labels import Label, Labels
 from navirl_cli.demos.recordings import Job, extracted, rows_of, sources_for
-from navirl_cli.errors import ArtefactError, DemonstrationError, LabelError, NavirlError, WorkerLostError
+from navirl_cli.errors import ArtefactError, DemonstrationError, LabelError, NavirlError, WorkerLostError, counted
 from navirl_cli.files import MANIFEST, Input, new_folder, replacing
 from navirl_cli.logs.load import LoadOptions
 from navirl_cli.logs.sources import Source
@@ -175,7 +175,9 @@ class Folder:
             done += sizes[number]
             if progress is not None:
                 progress(
-                    done, sum(sizes), f"{count} of {len(jobs)} logs, {done / 1e6:.1f} of {sum(sizes) / 1e6:.1f} MB"
+                    done,
+                    sum(sizes),
+                    f"{count} of {counted(len(jobs), 'log')}, {done / 1e6:.1f} of {sum(sizes) / 1e6:.1f} MB",
                 )
             if time.monotonic() > following:
                 following = time.monotonic() + max(_LEAST_S, _TIMES * self._save())
@@ -298,4 +300,4 @@ def check_some(entries: Sequence[Entry]) -> None:
         DemonstrationError: No log gave one.
     """
     if not any(one.status == DONE for one in entries):
-        raise DemonstrationError(f"none of the {len(entries)} logs can be used: {entries[0].reason}")
+        raise DemonstrationError(f"none of {counted(len(entries), 'log')} can be used: {entries[0].reason}")

@@ -8,7 +8,7 @@ from navirl_cli.artefacts.store import number, read_json
 from navirl_cli.evaluation.compare import DRIVEN, Comparison
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, quantiles_of
-from navirl_cli.evaluation.metrics import Metric, Values
+from navirl_cli.evaluation.metric import Metric, Values
 from navirl_cli.evaluation.paired import Interval, Paired
 from navirl_cli.evaluation.ranks import Ranking, by_group_and_training
 from navirl_cli.files import Input

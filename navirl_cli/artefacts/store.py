@@ -1,9 +1,11 @@
 """JSON files with a version. They are checked against their schema when they are read."""
 
+import gc
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -23,6 +25,21 @@ KINDS = ("demonstrations", "reward", "metrics", "plan", "study")
 #: How JSON escapes one half of a surrogate pair.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
+#: The first bytes of a log.
+_MCAP = b"\x89MCAP"
+
+
+@contextmanager
+def no_garbage() -> Iterator[None]:
+    """No search for garbage in the block: large contents hold none, and each search would walk through all of them."""
+    searching = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if searching:
+            gc.enable()
+
 
 def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: bool) -> None:
     """Write an artefact.
@@ -40,6 +57,7 @@ def write_json(path: Path, artefact: str, content: Mapping[str, Any], *, force: 
         temporary.write_bytes(as_bytes(artefact, content))
 
 
+@no_garbage()
 def as_bytes(artefact: str, content: Mapping[str, Any]) -> bytes:
     """The bytes of an artefact's file; arguments as of :func:`write_json`."""
     document = {"format": f"navirl/{artefact}", "version": VERSION, "navirl": __version__, **content}
@@ -84,6 +102,7 @@ def read_any(path: Path) -> tuple[str, dict[str, Any]]:
     return kind, _checked(document, path, kind)
 
 
+@no_garbage()
 def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
     """The content of a JSON file; arguments as of :func:`read_json`.
 
@@ -97,9 +116,11 @@ def _content(path: Path, artefact: str, sha256: str | None = None) -> Any:
         return _parsed(data.decode("utf-8"))
     except OSError as error:
         raise ArtefactError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        found = "an MCAP log; navirl extract makes demonstrations of it" if data.startswith(_MCAP) else "no text"
+        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found {found}") from error
     except (ValueError, RecursionError) as error:
-        hint = "; logs become demonstrations by navirl extract" if path.suffix == ".mcap" else ""
-        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error}){hint}") from error
+        raise ArtefactError(f"{path}: expected a JSON file of navirl {artefact}, found none ({error})") from error
 
 
 def _checked(document: Any, path: Path, artefact: str) -> dict[str, Any]:

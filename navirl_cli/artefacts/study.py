@@ -8,7 +8,7 @@ from navirl_cli.artefacts.analyses import intervals_document
 from navirl_cli.artefacts.store import number, read_json
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import Values
+from navirl_cli.evaluation.metric import Values
 from navirl_cli.irl.fit import Fit
 from navirl_cli.study.claims import Claim
 from navirl_cli.study.learning import Closeness, CycleFit, Learnt

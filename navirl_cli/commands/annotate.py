@@ -27,6 +27,7 @@ from navirl_cli.demos.annotate import annotate as annotated
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.listing import TrialSettings
 from navirl_cli.demos.trials import Split
+from navirl_cli.errors import counted
 from navirl_cli.logs.load import LoadOptions
 
 
@@ -73,7 +74,7 @@ def annotate(
     if as_json:
         echo_json({"log": str(found.path), "trials": found.trials, "labelled": found.labelled})
     else:
-        echo(f"{found.path}: {found.labelled} of {found.trials} trials labelled")
+        echo(f"{found.path}: {found.labelled} of {counted(found.trials, 'trial')} labelled")
     for note in found.notes:
         say(note)
     finish(found.damage)

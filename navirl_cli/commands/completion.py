@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 from warnings import catch_warnings, simplefilter
 
 import click
 from click.shell_completion import BashComplete, CompletionItem, add_completion_class
+
+if TYPE_CHECKING:
+    from navirl_cli.demos.demonstration import Demonstration
 
 #: Characters with a special meaning in bash.
 _SPECIAL, _ESCAPED = re.compile(r"[^\w,./:=@%+-]"), r"\\\g<0>"
@@ -44,20 +47,20 @@ def _files(ctx: click.Context, name: str) -> list[Path]:
     return [Path(one) for one in ([found] if isinstance(found, Path) else found)]
 
 
-def _demos(ctx: click.Context) -> Path:
-    """The demonstrations file on the command line: the argument, or that of ``--scene DEMOS[:TRIAL]``."""
+def _demonstrations(ctx: click.Context) -> "list[Demonstration]":
+    """Those of the files on the command line: of the argument, or of ``--scene DEMOS[:TRIAL]``."""
+    from navirl_cli.artefacts.joined import read_joined
+
     scene = ctx.params.get("scene")
     if scene is None:
-        return _files(ctx, "demos")[0]
-    return Path(scene if Path(scene).exists() else scene.rpartition(":")[0])
+        return read_joined(_files(ctx, "demos"))
+    return read_joined([Path(scene if Path(scene).exists() else scene.rpartition(":")[0])])
 
 
 @_proposed
 def trials(ctx: click.Context, _incomplete: str) -> Iterator[str]:
     """Ids of the demonstrations in the file on the command line."""
-    from navirl_cli.artefacts.demonstrations import read_demonstrations
-
-    return (one.id for one in read_demonstrations(_demos(ctx)))
+    return (one.id for one in _demonstrations(ctx))
 
 
 def _names(field: str) -> Complete:
@@ -65,10 +68,9 @@ def _names(field: str) -> Complete:
 
     @_proposed
     def names(ctx: click.Context, _incomplete: str) -> Iterable[str]:
-        from navirl_cli.artefacts.demonstrations import read_demonstrations
         from navirl_cli.demos.subset import FIELDS
 
-        found = [FIELDS[field](one) for one in read_demonstrations(_demos(ctx))]
+        found = [FIELDS[field](one) for one in _demonstrations(ctx)]
         return sorted({name.removeprefix("cycle ") for name in found if name != "no cycle"})
 
     return names
@@ -80,10 +82,9 @@ cycles, sets, participants = _names("cycle"), _names("set"), _names("participant
 @_proposed
 def groups(ctx: click.Context, _incomplete: str) -> Iterable[str]:
     """Groups of the demonstrations in the file on the command line, by the fields on it."""
-    from navirl_cli.artefacts.demonstrations import read_demonstrations
     from navirl_cli.evaluation.groups import by_group
 
-    return by_group(read_demonstrations(_files(ctx, "demos")[0]), ctx.params.get("fields") or ())
+    return by_group(_demonstrations(ctx), ctx.params.get("fields") or ())
 
 
 @_proposed

@@ -1,6 +1,7 @@
 """``navirl evaluate``: metrics of demonstrated, learnt and baseline paths, and comparisons of groups."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,11 +36,12 @@ from navirl_cli.demos.subset import FIELDS
 from navirl_cli.documents.tables import ENDINGS, Format, written
 from navirl_cli.errors import unknown
 from navirl_cli.evaluation.drawn import Precision
-from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS, Metric
-from navirl_cli.evaluation.questions import answers_to, asked_of
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import BY_NAME, PAPER_METRICS
+from navirl_cli.evaluation.questions import Answers, Asked, answers_to, asked_of
 from navirl_cli.files import Input
 from navirl_cli.reports.evaluation import evaluation_text, metrics_table, write_evaluation
-from navirl_cli.reports.per_trial import write_per_trial
+from navirl_cli.reports.per_trial import PER_TRIAL_ENDINGS, check_per_trial, write_per_trial
 
 
 class Shares(click.ParamType):  # type: ignore[type-arg]
@@ -170,9 +172,9 @@ class Metrics(click.ParamType):  # type: ignore[type-arg]
     ),
     click.option(
         "--per-trial",
-        type=OutputPath((".csv", ".parquet")),
-        help="Long table to write as well, one row for each trial, type of path and metric: .csv, or .parquet where "
-        "pandas and pyarrow are installed.",
+        type=OutputPath(PER_TRIAL_ENDINGS),
+        help="Long table to write as well, one row for each trial, type of path and metric: .csv, or .parquet "
+        "where pyarrow is installed.",
     ),
     output_option("File to write as well: .json, .csv, .md or .tex.", *ENDINGS, required=False),
     json_option,
@@ -210,52 +212,24 @@ def evaluate(
     learnt paths. Distances are from the robot's shell to people's centres. Expected visits of the policy give exact
     means of path length, heading change and path length in zones; the other means are over sampled paths.
     """
-    import numpy as np
-
     if list_metrics:
         _list_metrics(Format(style), as_json=as_json)
         return
     _check_arguments(demos, rewards, pairs, ranks=ranks)
-    refuse_unused("--reward", "person", used=bool(rewards))
-    outputs = [path for path in (output, per_trial) if path is not None]
-    for path in outputs:
-        check_output(path, [*demos, *rewards], force=force)
+    _check_files([*demos, *rewards], output, per_trial, force=force)
     everyone = dict(zip(_names(demos), map(demonstrations_in, demos), strict=True))
     learnt = {path.stem: _reward_for(path, everyone, person) for path in rewards}
     trained = [one.trained([d for own in everyone.values() for d in own]) for one in learnt.values()]
     asked = asked_of(
-        everyone,
-        choosing.subset,
-        trained,
-        everything=choosing.everything,
-        pairs=pairs,
-        fields=fields,
-        ranked=ranks,
+        everyone, choosing.subset, trained, everything=choosing.everything, pairs=pairs, fields=fields, ranked=ranks
     )
     for line in asked.notes:
         say(line)
-    rng, precision = np.random.default_rng(seed), Precision(samples, error)
-    bar = progress_bar("evaluate", sum(map(len, asked.files.values())))
-    with workers_of(workers, cluster) as executor, bar as update:
-        found = answers_to(
-            asked,
-            {name: one.reward for name, one in learnt.items()},
-            metrics,
-            precision,
-            rng,
-            lambda done, _all: update(done, ""),
-            executor,
-        )
-    document = metrics_document(
-        found.result,
-        found.pairs,
-        found.ranked,
-        metrics,
-        [Input.of(path) for path in (*demos, *rewards)],
-        precision,
-        seed,
-        quantiles,
-    )
+    precision = Precision(samples, error)
+    with workers_of(workers, cluster) as executor:
+        found = _answers(asked, learnt, metrics, precision, seed, executor)
+    inputs = [Input.of(path) for path in (*demos, *rewards)]
+    document = metrics_document(found.result, found.pairs, found.ranked, metrics, inputs, precision, seed, quantiles)
     if per_trial is not None:
         write_per_trial(per_trial, found.result, asked.files, metrics, force=force)
     text = partial(evaluation_text, found.result, found.pairs, found.ranked, metrics, quantiles=quantiles)
@@ -266,6 +240,34 @@ def evaluate(
     else:
         echo(text(Format(style)))
     finish(found.result.notes)
+
+
+def _answers(
+    asked: Asked,
+    learnt: Mapping[str, LearntReward],
+    metrics: Sequence[Metric],
+    precision: Precision,
+    seed: int,
+    executor: Executor,
+) -> Answers:
+    """Everything that is asked for, with a progress bar."""
+    import numpy as np
+
+    rewards = {name: one.reward for name, one in learnt.items()}
+    with progress_bar("evaluate", sum(map(len, asked.files.values()))) as update:
+        rng = np.random.default_rng(seed)
+        return answers_to(asked, rewards, metrics, precision, rng, lambda done, _all: update(done, ""), executor)
+
+
+def _check_files(inputs: Sequence[Path], output: Path | None, per_trial: Path | None, *, force: bool) -> None:
+    """Refuse, before any work, files that cannot be written."""
+    for path in (output, per_trial):
+        if path is not None:
+            check_output(path, inputs, force=force)
+    if output is not None and per_trial is not None and output.resolve() == per_trial.resolve():
+        raise click.UsageError("--output and --per-trial: expected two files, found one twice.")
+    if per_trial is not None:
+        check_per_trial(per_trial)
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -296,10 +298,12 @@ def _check_arguments(
     if len({*demos}) < len(demos):
         raise click.UsageError("DEMOS: expected different files, found one twice.")
     if ranks and len(demos) > 1:
-        raise click.UsageError("--ranks needs one file of demonstrations.")
-    refuse_unused("--reward", "samples", "error", "everything", used=bool(rewards))
+        raise click.UsageError(
+            "--ranks needs one file of demonstrations; join several with navirl merge, or leave out --ranks."
+        )
+    refuse_unused("--reward", "samples", "error", "everything", "person", used=bool(rewards))
     if ranks and len(rewards) != 1:
-        raise click.UsageError("--ranks needs one --reward.")
+        raise click.UsageError("--ranks needs one --reward; give one, or leave out --ranks.")
     stems = [path.stem for path in rewards]
     if twice := [stem for stem in stems if stems.count(stem) > 1]:
         raise click.UsageError(f"--reward: expected files of different names, found several {twice[0]}; rename one.")

@@ -38,7 +38,7 @@ from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.rasterize import Rule
-from navirl_cli.demos.recordings import Recordings, extract_recordings
+from navirl_cli.demos.recordings import Recordings, check_no_wrench, extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.text import to_text
 from navirl_cli.files import Input
@@ -216,8 +216,8 @@ def extract(
     pass through the sensor is not measured.
     """
     chosen = topics_by_role(topics)
-    if no_wrench and (gain or wrench_frame or force_scale != 1 or "wrench" in chosen):
-        raise click.UsageError("--no-wrench excludes --gain, --wrench-frame, --force-scale and --topic wrench=/NAME.")
+    if no_wrench:
+        check_no_wrench(gain=gain, wrench_frame=wrench_frame, force_scale=force_scale, topics=chosen)
     files = [one for one in (map_file, trials) if one is not None]
     if not output.is_folder:
         check_output(output.path, [*logs, *files], force=force)
@@ -248,7 +248,7 @@ def extract(
         strict=strict,
     )
     labels = None if trials is None else read_labels(trials)
-    said = settings_document(settings, options, map_file, trials)
+    said = settings_document(settings, options, map_file, trials, join=join)
     if output.is_folder:
         folder = Folder(output.path, settings, options, said, list(map(Input.of, files)))
         with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:

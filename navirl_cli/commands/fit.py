@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite, nan
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -29,7 +30,7 @@ from navirl_cli.commands.shared import (
     workers_options,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath
-from navirl_cli.commands.usage import Command, Example, as_options, section
+from navirl_cli.commands.usage import Command, Example, as_options, given_words, section
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import RewardError
 from navirl_cli.evaluation.reach import reach_effect
@@ -44,7 +45,8 @@ from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
-from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
+from navirl_cli.reports.fit import report
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 
 
 @click.command(
@@ -115,7 +117,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
         type=Choice([kind.value for kind in ASKED]),
         help="Where 95 % intervals come from: profile likelihoods, or standard errors (wald). Default: profile with "
         f"fewer than {FEW_DEMONSTRATIONS} demonstrations or where a standard error leaves the admissible range, else "
-        "wald; wald with a term of turns, where profiles take minutes.",
+        "wald.",
     ),
     click.option(
         "--bootstrap",
@@ -141,7 +143,7 @@ from navirl_cli.reports.fit import cannot_learn, remarks, report, warnings
 @workers_options
 @section("Output", output_option("Reward file to write."), json_option, force_option)
 def fit(
-    demos: Path,
+    demos: tuple[Path, ...],
     output: Path,
     terms: tuple[Term, ...],
     initial: str,
@@ -175,12 +177,13 @@ def fit(
     kind = None if intervals is None else Kind(intervals)
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
-    files = [demos, *([Path(initial)] if initial and "=" not in initial else []), *([prior_file] if prior_file else [])]
+    named = [Path(initial)] if initial and "=" not in initial else []
+    files = [*demos, *named, *([prior_file] if prior_file else [])]
     check_output(output, files, force=force)
     given = _given(initial)
     if prior_file is None:
         _start(terms, given)  # refuses wrong words before the work
-    everyone = demonstrations_in(demos)
+    everyone = demonstrations_in(*demos)
     selected = select(
         of_participant(everyone, person),
         choosing.subset,
@@ -195,28 +198,33 @@ def fit(
     questions.check(evidence, start)
     for line in cannot_learn(chosen):
         say(line)
-    plain = _learn(evidence, start, None if earlier is None else earlier.as_prior(person), l2, Method(method))
-    effect = reach_effect(chosen, plain, Steps(steps), reach)
+    prior = None if earlier is None else earlier.as_prior(person)
     with workers_of(workers, cluster) as executor:
-        whole = Steps(steps) is Steps.ALL
-        others = None if earlier is None else earlier.others
+        with evidence.kept_by(executor) as kept:
+            plain = _learn(kept, start, prior, l2, Method(method))
+        effect = reach_effect(chosen, plain, Steps(steps), reach, evidence, executor)
+        others, whole = None if earlier is None else earlier.others, Steps(steps) is Steps.ALL
         found, analyses, lost = answers(
             evidence, plain, questions, others=others, whole_paths=whole, executor=executor, bars=progress_bar
         )
-    document = reward_document(
-        found, chosen, [Input.of(path) for path in files], selected.resolution_m, analyses, steps, effect
-    )
-    if person is not None and earlier is not None:
-        document |= whose(person, earlier.participants)
+    inputs = [Input.of(path) for path in files]
+    document = reward_document(found, chosen, inputs, selected.resolution_m, analyses, steps, effect)
+    document |= {} if person is None or earlier is None else whose(person, earlier.participants)
+    document["options"] = given_words()
     write_json(output, "reward", document, force=force)
+    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
+    _show(document, [*notes, *reach_unused(document, reach)], as_json=as_json)
+    finish(lost)
+
+
+def _show(document: dict[str, Any], notes: Sequence[str], *, as_json: bool) -> None:
+    """Print the fit, and below it what a reader should know of it."""
     if as_json:
         echo_json(document)
     else:
         echo(to_text(report(document)))
-    notes = remarks(chosen, earlier, chosen_by=choosing.subset.condition, everyone=everyone)
-    for line in (*notes, *reach_unused(document, reach), *warnings(document, status=False)):
+    for line in (*notes, *warnings(document, status=False)):
         say(line)
-    finish(lost)
 
 
 def _learn(evidence: Evidence, start: Reward, prior: Prior | None, l2: float, method: Method) -> Fit:

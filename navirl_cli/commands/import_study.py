@@ -64,4 +64,5 @@ def import_study(runs: Path, output: Path, as_json: bool, force: bool) -> None:
         echo_json(imported_document(logs, lost))
     else:
         echo(written(imported_table(logs)))
+    say(f"the study has no forces: extract needs --no-wrench for these logs; navirl study {output} evaluates them")
     finish(lost)

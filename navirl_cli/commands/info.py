@@ -5,11 +5,14 @@ from pathlib import Path
 
 import click
 
+from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.manifest import manifest_path
 from navirl_cli.artefacts.store import read_any
-from navirl_cli.commands.shared import echo, echo_json, json_option
+from navirl_cli.commands.shared import echo, echo_json, json_option, say
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.text import to_text
+from navirl_cli.files import MANIFEST
 from navirl_cli.reports.info import field_of, info_report, summary_of
 
 
@@ -17,10 +20,11 @@ from navirl_cli.reports.info import field_of, info_report, summary_of
     cls=Command,
     examples=[
         Example("Which participants, conditions and cycles there are", "navirl info demos.json"),
+        Example("Several files as one", "navirl info monday.json tuesday.json"),
         Example("One value for a script", "navirl info reward.json --field parameters.c0"),
     ],
 )
-@click.argument("file", type=FilePath)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FilePath)
 @section(
     "Output",
     click.option(
@@ -30,14 +34,19 @@ from navirl_cli.reports.info import field_of, info_report, summary_of
     ),
     json_option,
 )
-def info(file: Path, field: str | None, as_json: bool) -> None:
+def info(files: tuple[Path, ...], field: str | None, as_json: bool) -> None:
     """Show what a file of demonstrations, a reward, metrics, a plan or a study holds.
 
-    For logs, see navirl inspect.
+    Several files of demonstrations, and folders of them, are shown as one. For logs, see navirl inspect.
     """
     if field is not None and as_json:
         raise click.UsageError("--field prints one value; leave out --json.")
-    artefact, content = read_any(file)
+    if len(files) == 1 and manifest_path(files[0]).name != MANIFEST:
+        artefact, content = read_any(files[0])
+    else:
+        artefact, (content, notes) = "demonstrations", read_content(files)
+        for line in notes:
+            say(line)
     summary = summary_of(artefact, content)
     if field is not None:
         value = field_of(summary, content, field)
@@ -45,4 +54,4 @@ def info(file: Path, field: str | None, as_json: bool) -> None:
     elif as_json:
         echo_json(summary)
     else:
-        echo(to_text(info_report(str(file), artefact, content)))
+        echo(to_text(info_report(", ".join(map(str, files)), artefact, content)))

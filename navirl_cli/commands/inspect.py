@@ -88,6 +88,10 @@ def inspect(
     settings = TrialSettings(Split(split), goal)
     if check and trials:
         raise click.UsageError("--check excludes --trials.")
+    if tables := [path for path in logs if trials and path.suffix.lower() == ".csv"]:
+        raise click.UsageError(
+            f"--trials prints the table; write it with: navirl inspect LOG --trials > {tables[0].name}"
+        )
     if not trials and (settings != TrialSettings() or frame):
         raise click.UsageError("--split, --goal and --frame need --trials.")
     options = LoadOptions(topics=topics_by_role(topics), namespace=namespace, frame=frame)

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import click
 
-from navirl_cli.artefacts.editing import merged
-from navirl_cli.artefacts.store import read_json, write_json
-from navirl_cli.commands.shared import check_output, echo, force_option, output_option, say
-from navirl_cli.commands.types import FilePath
+from navirl_cli.artefacts.editing import plain
+from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.manifest import manifest_path
+from navirl_cli.artefacts.store import write_json
+from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.errors import counted
+from navirl_cli.files import MANIFEST
 
 
 @click.command(
@@ -19,21 +21,18 @@ from navirl_cli.errors import counted
         Example("In place of an older file", "navirl merge monday.json tuesday.json -o demos.json --force"),
     ],
 )
-@click.argument("demos", metavar="DEMOS...", nargs=-1, required=True, type=FilePath)
+@demos_argument
 @section("Output", output_option("Demonstrations file to write."), force_option)
 def merge(demos: tuple[Path, ...], output: Path, force: bool) -> None:
-    """Write the trials of several demonstrations files into one.
+    """Write the trials of several demonstrations files into one, or those of a folder with a manifest.
 
     The ids of trials must differ. Settings of the extractions that differ are listed.
     """
-    if len(demos) < 2:
-        raise click.UsageError("merge needs two or more files.")
+    if len(demos) == 1 and manifest_path(demos[0]).name != MANIFEST:
+        raise click.UsageError("merge needs two or more files, or a folder.")
     check_output(output, demos, force=force)
-    documents = {str(path): read_json(path, "demonstrations") for path in demos}
-    if len(documents) < len(demos):
-        raise click.UsageError("merge: expected different files, found one twice.")
-    content, notes = merged(documents)
-    write_json(output, "demonstrations", content, force=force)
+    content, notes = read_content(demos)
+    write_json(output, "demonstrations", plain(content), force=force)
     people = {one["participant"] for one in content["demonstrations"]}
     count = len(people)
     echo(f"{output}: {counted(len(content['demonstrations']), 'demonstration')} of {counted(count, 'participant')}")

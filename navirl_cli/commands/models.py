@@ -20,10 +20,11 @@ from navirl_cli.commands.shared import (
 )
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.documents.text import to_text
-from navirl_cli.irl.models import MODELS, compare_models
+from navirl_cli.errors import counted
+from navirl_cli.irl.models import MODELS, compare_models, with_paper
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
-from navirl_cli.reports.fit import cannot_learn
+from navirl_cli.reports.fit_remarks import cannot_learn
 from navirl_cli.reports.models import models_document, models_lost, models_remarks, models_report
 
 
@@ -52,7 +53,7 @@ from navirl_cli.reports.models import models_document, models_lost, models_remar
 @workers_options
 @section("Output", json_option)
 def models(
-    demos: Path,
+    demos: tuple[Path, ...],
     choosing: Choosing,
     only_corrected: bool,
     truncated: bool,
@@ -71,7 +72,7 @@ def models(
     if reach is not None and Steps(steps) is not Steps.REACHABLE:
         raise click.UsageError("--reach needs --steps reachable.")
     selected = select(
-        demonstrations_in(demos),
+        demonstrations_in(*demos),
         choosing.subset,
         only_corrected=only_corrected,
         truncated=truncated,
@@ -80,9 +81,11 @@ def models(
     )
     for line in cannot_learn(selected.demonstrations):
         say(line)
-    chosen = models or MODELS
-    people = len(selected.evidence.several_people("models"))
-    with workers_of(workers, cluster) as executor, progress_bar("fit", (people + 1) * len(chosen)) as update:
+    chosen = with_paper(models or MODELS)
+    each = len(selected.evidence.several_people("models")) + 1
+    say(f"{counted(len(chosen), 'model')}, each fitted {each} times: to all participants, and to all but each")
+    bar = progress_bar("fit", each * len(chosen), line_every=each)
+    with workers_of(workers, cluster) as executor, bar as update:
         found = compare_models(selected.evidence, chosen, l2, executor=executor, progress=update)
     if as_json:
         echo_json(models_document(found, l2))

@@ -6,12 +6,14 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
 from navirl_cli.artefacts.editing import relabelled as relabelled_content
-from navirl_cli.artefacts.store import read_json, write_json
+from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
 from navirl_cli.commands.types import FilePath
 from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.relabelling import relabelled
+from navirl_cli.errors import Number, counted
 
 
 @click.command(
@@ -33,20 +35,20 @@ from navirl_cli.demos.relabelling import relabelled
     ),
 )
 @section("Output", output_option("Demonstrations file to write."), force_option)
-def relabel(demos: Path, trials: Path, output: Path, force: bool) -> None:
+def relabel(demos: tuple[Path, ...], trials: Path, output: Path, force: bool) -> None:
     """Give trials of a demonstrations file other labels, without extracting them again.
 
     Empty cells change nothing. A new participant renames a trial. Robot radius, people and nominal line change maps
     or paths: for these, extract again with the table.
     """
-    check_output(output, [demos, trials], force=force)
-    document = read_json(demos, "demonstrations")
-    before = demonstrations_of(document, str(demos))
+    check_output(output, [*demos, trials], force=force)
+    document, unlike = read_content(demos)
+    before = demonstrations_of(document, ", ".join(map(str, demos)))
     after, notes = relabelled(before, read_labels(trials))
     write_json(output, "demonstrations", relabelled_content(document, after), force=force)
     changed = sum(_labels(old) != _labels(new) for old, new in zip(before, after, strict=True))
-    echo(f"{output}: {changed} of {len(after)} demonstrations have other labels")
-    for line in notes:
+    echo(f"{output}: {changed} of {counted(len(after), 'demonstration')} {Number(changed):has|have} other labels")
+    for line in (*unlike, *notes):
         say(line)
 
 

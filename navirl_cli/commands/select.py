@@ -6,10 +6,12 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
 from navirl_cli.artefacts.editing import some_of
-from navirl_cli.artefacts.store import read_json, write_json
+from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.choosing import Choosing, choice_options
-from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option
+from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
 from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.errors import counted
 
 
 @click.command(
@@ -22,16 +24,18 @@ from navirl_cli.commands.usage import Command, Example, section
 @demos_argument
 @choice_options(reward=False)
 @section("Output", output_option("Demonstrations file to write."), force_option)
-def select(demos: Path, choosing: Choosing, output: Path, force: bool) -> None:
+def select(demos: tuple[Path, ...], choosing: Choosing, output: Path, force: bool) -> None:
     """Write some of the trials of a demonstrations file.
 
     Everything else of the file stays as it is. Names of one option are alternatives, and all options hold at once.
     """
     if not choosing.subset.names:
         raise click.UsageError("Name what to select: --condition, --cycle, --set, --participant or --trial.")
-    check_output(output, [demos], force=force)
-    document = read_json(demos, "demonstrations")
-    everyone = demonstrations_of(document, str(demos))
+    check_output(output, demos, force=force)
+    document, notes = read_content(demos)
+    everyone = demonstrations_of(document, ", ".join(map(str, demos)))
     chosen = choosing.of(everyone)
     write_json(output, "demonstrations", some_of(document, {one.id for one in chosen}), force=force)
-    echo(f"{output}: {len(chosen)} of {len(everyone)} demonstrations")
+    echo(f"{output}: {len(chosen)} of {counted(len(everyone), 'demonstration')}")
+    for line in notes:
+        say(line)

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from navirl_cli.artefacts.demonstrations import read_demonstrations
+from navirl_cli.artefacts.joined import read_joined
 from navirl_cli.commands import completion
 from navirl_cli.commands.types import Choice, Count, FilePath, LogPath, OutputPath, Point, RoleTopic
 from navirl_cli.commands.usage import Function, as_options, is_quiet, is_verbose, section
@@ -33,7 +33,8 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON i
 seed_option = click.option(
     "--seed", default=0, show_default=True, type=Count(min=0), help="Seed of all random numbers."
 )
-demos_argument = click.argument("demos", type=FilePath)
+#: Files of demonstrations, and folders with a manifest.
+demos_argument = click.argument("demos", metavar="DEMOS...", nargs=-1, required=True, type=FilePath)
 person_option = click.option(
     "--person",
     metavar="NAME",
@@ -100,16 +101,17 @@ def topics_by_role(topics: Sequence[tuple[str, str]]) -> dict[str, tuple[str, ..
     return chosen
 
 
-def demonstrations_in(path: Path) -> list[Demonstration]:
-    """The demonstrations of a file; an error if it holds none.
+def demonstrations_in(*paths: Path) -> list[Demonstration]:
+    """The demonstrations of files and folders; an error if they hold none.
 
     Raises:
-        DemonstrationError: It holds none.
-        ArtefactError: The file is not a demonstrations file.
+        DemonstrationError: They hold none, or two have the same id.
+        ArtefactError: One is not a demonstrations file.
+        ArgumentError: One is named twice.
     """
-    demonstrations = read_demonstrations(path)
+    demonstrations = read_joined(paths)
     if not demonstrations:
-        raise DemonstrationError(f"{path}: holds no demonstrations")
+        raise DemonstrationError(f"{', '.join(map(str, paths))}: holds no demonstrations")
     return demonstrations
 
 
@@ -241,19 +243,21 @@ def bytes_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def progress_bar(label: str, length: int | None = None, *, lines: bool = False) -> Iterator[Callable[[int, str], None]]:
+def progress_bar(
+    label: str, length: int | None = None, *, line_every: int | None = None
+) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, if stderr is a terminal.
 
     Args:
         label: The present work.
         length: Number of steps, or None if it is not known.
-        lines: Whether to print a line for each step elsewhere: for work of minutes.
+        line_every: After so many steps a line is printed elsewhere, for work of minutes; none without it.
 
     Yields:
         A function that takes the number of steps done and a short text on the present one.
     """
     if is_quiet() or not sys.stderr.isatty():
-        yield _by_lines(label, length, every_s=0.0 if lines else EVERY_S if is_verbose() else inf)
+        yield _by_lines(label, length, line_every, EVERY_S if is_verbose() else inf)
         return
     steps = None if length is not None else iter(int, 1)
     new = click.progressbar(
@@ -267,17 +271,29 @@ def progress_bar(label: str, length: int | None = None, *, lines: bool = False) 
         yield update
 
 
-def _by_lines(label: str, length: int | None, every_s: float) -> Callable[[int, str], None]:
-    """Progress as lines, at most one in a time, and one at the end; none where the time is infinite."""
-    last = -every_s
+def _by_lines(label: str, length: int | None, line_every: int | None, every_s: float) -> Callable[[int, str], None]:
+    """Progress as lines after so many steps, and after so much time, with an estimate of the time left from two on."""
+    start = monotonic()
+    last = -inf
 
     def update(done: int, word: str) -> None:
         nonlocal last
-        if every_s < inf and (done == length or monotonic() - last >= every_s):
-            last = monotonic()
-            say(f"{label} {done}" + ("" if length is None else f" of {length}") + (f": {word}" if word else ""))
+        now = monotonic()
+        timely = every_s < inf and (now - last >= every_s or done == length)
+        if timely or (line_every and done % line_every == 0):
+            last = now
+            left = "" if length is None or not 1 < done < length else _left((now - start) / done * (length - done))
+            parts = ["" if length is None else f" of {length}", f": {word}" if word else "", left]
+            say(f"{label} {done}{''.join(parts)}")
 
     return update
+
+
+def _left(left_s: float) -> str:
+    """An estimated time in words; empty for a few seconds."""
+    if left_s < 10:
+        return ""
+    return f"; about {left_s:.0f} s left" if left_s < 90 else f"; about {left_s / 60:.0f} min left"
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import click
@@ -39,9 +40,10 @@ from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
 from navirl_cli.documents.text import to_text
 from navirl_cli.errors import ArtefactError
-from navirl_cli.files import Input, check_writable, replacing, swapped_folder
+from navirl_cli.files import MANIFEST, Input, check_writable, replacing, swapped_folder
 from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.remote import Remote
 
 if TYPE_CHECKING:
     from navirl_cli.irl.terms.term import Term
@@ -112,11 +114,11 @@ def study(
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
     _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)
-    with workers_of(workers, cluster) as executor, swapped_folder(output) as folder:
+    with workers_of(workers, cluster) as executor, swapped_folder(output) as folder, TemporaryDirectory() as screens:
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
         demonstrations = given.demonstrations
-        with progress_bar("fit", len(people_of(demonstrations)) + 1, lines=True) as update:
+        with progress_bar("fit", len(people_of(demonstrations)) + 1, line_every=1) as update:
             found = study_of(
                 demonstrations,
                 given.completion_s,
@@ -137,7 +139,9 @@ def study(
         pooled = pooled_policy(found)
         with progress_bar("draw", len(FIGURES)) as update:
             here = executor if cluster is None else None  # figures are files of this machine
-            drawn = draw_study(found, pooled, bars, folder / "figures", force=force, progress=update, executor=here)
+            drawn = draw_study(
+                found, pooled, bars, folder / "figures", Path(screens), force=force, progress=update, executor=here
+            )
         problems = [line for one in (*found.participants, found.pooled) for line in one.problems]
         lost = [*given.lost, *problems, *pooled.notes]
         notes = [*merged(given.notes), *remarks(demonstrations, answers)]
@@ -170,13 +174,15 @@ class _Given:
 
 
 def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _Given:
-    """Logs extracted, or the demonstrations of a file that extract wrote."""
-    if len(logs) == 1 and logs[0].suffix == ".json":
-        held = demonstrations_in(logs[0])
+    """Logs extracted, or the demonstrations of files that extract wrote."""
+    if all(_holds_demonstrations(path) for path in logs):
+        held = demonstrations_in(*logs)
         demonstrations = whole(held)
         notes = [f"{one.id}: {note}" for one in demonstrations for note in (*one.notes, *one.warnings)]
         lost = [f"left out: {one.id} is cut off" for one in held if one.truncated]
-        return _Given(demonstrations, [logs[0].name], [Input.of(logs[0])], {}, [], set(), notes, lost)
+        return _Given(
+            demonstrations, [one.name for one in logs], [Input.of(one) for one in logs], {}, [], set(), notes, lost
+        )
     with bytes_bar("extract") as update:
         found = extract_recordings(logs, ExtractSettings(), options, executor=executor, progress=update)
     results, demonstrations = found.extractions, found.demonstrations()
@@ -190,6 +196,11 @@ def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _G
         found.notes(demonstrations),
         found.lost,
     )
+
+
+def _holds_demonstrations(path: Path) -> bool:
+    """Whether a path is one of a demonstrations file, or of a folder of them."""
+    return path.suffix == ".json" or (not isinstance(path, Remote) and (path / MANIFEST).is_file())
 
 
 def _check_files(output: Path, inputs: Sequence[Path], *, force: bool) -> None:

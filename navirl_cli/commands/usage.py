@@ -53,6 +53,21 @@ def refuse_unused(needs: str, *names: str, used: bool) -> None:
             raise click.UsageError(f"{max(param.opts, key=len)} goes with {needs}.")
 
 
+def given_words() -> list[str]:
+    """The options that the present command was given, by the user or by navirl.toml, as an artefact keeps them."""
+    from navirl_cli.artefacts.options import option_words
+
+    context = click.get_current_context()
+    given: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
+    for param in context.command.params:
+        known = context.get_parameter_source(param.name or "") not in {ParameterSource.DEFAULT, None}
+        if isinstance(param, click.Option) and known:
+            name = max(param.opts, key=len).removeprefix("--").replace("-", "_")
+            given[name], defaults[name] = context.params[param.name or ""], param.default
+    return option_words(given, defaults)
+
+
 class Example(NamedTuple):
     """A command that a reader can copy, and its purpose."""
 
@@ -89,7 +104,7 @@ def _exclusive(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if value:
         own, other = (QUIET, VERBOSE) if param.name == "quiet" else (VERBOSE, QUIET)
         if ctx.meta.get(other):
-            raise click.UsageError("--quiet and --verbose exclude each other.")
+            raise click.UsageError("--quiet and --verbose exclude each other; leave out one.")
         ctx.meta[own] = True
 
 
@@ -173,7 +188,14 @@ class Command(WithExamples):
         """Parse the words, with the values of navirl.toml beside the data in place of defaults."""
         if not ctx.resilient_parsing:
             self._take_experiment(ctx, args)
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except click.BadParameter as error:
+            name, experiment = "" if error.param is None else error.param.name or "", ctx.meta.get(EXPERIMENT)
+            if experiment is not None and ctx.get_parameter_source(name) is ParameterSource.DEFAULT_MAP:
+                text = f"{error.message} ({experiment.path})"
+                raise click.BadParameter(text, error.ctx, error.param, error.param_hint) from error
+            raise
 
     def _take_experiment(self, ctx: click.Context, args: Sequence[str]) -> None:
         """Use the file's values as defaults; a line says which, if the command runs."""

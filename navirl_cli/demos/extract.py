@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -120,12 +121,7 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
     unseen = unseen_goals(recording) if settings.split is Split.GOAL else ""
     reasons = [*_grouped(skipped), *([unseen] if unseen else [])]
     if not found:
-        cut = bool(skipped) and all(isinstance(error, TruncatedError) for _, error in skipped)
-        reasons = reasons or ["no goal is announced while poses are recorded"]
-        prefix = f"{recording.log}: "
-        # what was lost on the way may be the cause
-        text = f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
-        raise TruncatedError(text) if cut else DemonstrationError(text)
+        raise _nothing(recording, reasons, [error for _, error in skipped])
     lines = tuple(f"{recording.log}: {line}" for line in reasons)
     notes = [*recording.notes, *recording_notes(recording, pushes, settings.push)]
     own = {(number := _number(one)): stated[number - 1] for one in found}
@@ -151,6 +147,16 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         published=_published(recording, trials, found),
         completion_s=recording.session.completion_s,
     )
+
+
+def _nothing(recording: Recording, reasons: Sequence[str], errors: Sequence[NavirlError]) -> NavirlError:
+    """The error of a recording of which no trial is left."""
+    cut = bool(errors) and all(isinstance(error, TruncatedError) for error in errors)
+    reasons = reasons or ["no goal is announced while poses are recorded"]
+    prefix = f"{recording.log}: "
+    # what was lost on the way may be the cause
+    text = f"{prefix}no trial became a demonstration: {joined([*reasons, *recording.damage], prefix)}"
+    return TruncatedError(text) if cut else DemonstrationError(text)
 
 
 def numbered(extractions: Iterable[Extraction]) -> list[Demonstration]:
@@ -201,23 +207,10 @@ def _demonstration(
     check_travel(xy)
     check_gaps(recording, trial, pushes)
     cut_off = _cut_off(recording, trial, settings)
-    goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
-    radius_m = _radius_m(recording, settings)
-    ground = grids.during(start_ns, stop_ns)
-    grid = ground.grid
-    people = _people(recording, settings, declared, trial, ground.occupancy)
-    check_start(people.people_m, xy[0], radius_m)
-    cells, free = _on_grid(xy, grid, settings.rasterizer, radius_m)
-    if not trial.arrived:
-        check_goal(free, xy[0], goal)
+    placed = _placed(recording, trial, grids, settings, declared)
+    people = placed.people
     contacts = None if pushes is None else contacts_within(pushes, start_ns, stop_ns)
     observed, corrected = _observed(contacts, steered=_steered_s(recording, start_ns, stop_ns) > STEERED_S)
-    notes = [
-        *cut_off,
-        *ground.notes,
-        *path_notes(trial, cells, grid, xy[-1] - goal),
-        *jump_notes(recording, start_ns, stop_ns),
-    ]
     return Demonstration(
         id=name,
         participant=name.rpartition("/")[0],
@@ -230,19 +223,53 @@ def _demonstration(
         yaw_rad=recording.yaw_rad[span],
         force_n=None if pushes is None else pushes.force_at(t_ns),
         contacts=contacts,
-        goal_m=goal,
+        goal_m=placed.goal_m,
         people_m=people.people_m,
-        robot_radius_m=radius_m,
-        grid=free,
-        cells=cells,
+        robot_radius_m=placed.radius_m,
+        grid=placed.grid,
+        cells=placed.cells,
         log=recording.log,
         tracks=people.tracks,
         set=declared.set,
         nominal_m=declared.nominal_m,
         laid_out_m_s=recording.session.laid_out_m_s,
         truncated=bool(cut_off),
-        notes=(*notes, *people.notes),
+        notes=(*cut_off, *placed.notes, *people.notes),
     )
+
+
+class _Placed(NamedTuple):
+    """A trial's path on the map, with the people beside it."""
+
+    goal_m: tuple[float, float]
+    radius_m: float
+    people: People
+    cells: IntArray
+    #: With all cells of the path free.
+    grid: Grid
+    notes: tuple[str, ...]
+
+
+def _placed(
+    recording: Recording, trial: Trial, grids: TrialGrids, settings: ExtractSettings, declared: Declared
+) -> _Placed:
+    """Put a trial on its map."""
+    span = slice(trial.first, trial.stop)
+    xy, start_ns, stop_ns = recording.xy_m[span], int(recording.t_ns[span][0]), int(recording.t_ns[span][-1])
+    goal = trial.goal_m or settings.goal_m or (float(xy[-1, 0]), float(xy[-1, 1]))
+    radius_m = _radius_m(recording, settings)
+    ground = grids.during(start_ns, stop_ns)
+    people = _people(recording, settings, declared, trial, ground.occupancy)
+    check_start(people.people_m, xy[0], radius_m)
+    cells, free = _on_grid(xy, ground.grid, settings.rasterizer, radius_m)
+    if not trial.arrived:
+        check_goal(free, xy[0], goal)
+    notes = (
+        *ground.notes,
+        *path_notes(trial, cells, ground.grid, xy[-1] - goal),
+        *jump_notes(recording, start_ns, stop_ns),
+    )
+    return _Placed(goal, radius_m, people, cells, free, notes)
 
 
 def _cut_off(recording: Recording, trial: Trial, settings: ExtractSettings) -> list[str]:

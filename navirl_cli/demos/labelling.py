@@ -9,7 +9,7 @@ import numpy as np
 
 from navirl_cli.demos.labels import STATED, Label, Labels, points_text
 from navirl_cli.demos.trials import SAME_START_S, Trial, entries_by_trial
-from navirl_cli.errors import LabelError
+from navirl_cli.errors import LabelError, Number
 from navirl_cli.logs.recording import Declared, Recording, Session
 
 #: Trials that a message proposes in place of an unknown one.
@@ -162,7 +162,10 @@ def record_notes(recording: Recording, trials: Sequence[Trial]) -> list[str]:
         return []
     start_ns = int(recording.t_ns[trials[0].first])
     away_s = min(abs(entry.t_ns - start_ns) for entry in entries) / 1e9
-    found = f"of its {len(entries)} entries, the nearest to the first trial is {away_s:.1f} s away"
+    found = (
+        f"of its {len(entries)} {Number(len(entries)):entry|entries}, the nearest to the first trial is "
+        f"{away_s:.1f} s away"
+    )
     return [f"{recording.log}: its session record labels no trial: {found}; correct t_ns, or choose another `time`"]
 
 

@@ -1,6 +1,6 @@
 """From the logs that a user names to demonstrations: one bad recording does not spoil the others."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,7 +20,9 @@ from navirl_cli.errors import (
     TruncatedError,
     WorkerLostError,
     brief,
+    counted,
     joined,
+    refuse_beside,
 )
 from navirl_cli.files import Input
 from navirl_cli.logs.load import LoadOptions, load_recording
@@ -62,6 +64,22 @@ class Recordings:
     def lost(self) -> list[str]:
         """What was left out, damaged or skipped."""
         return [*self.left_out, *(line for one in self.extractions for line in (*one.damage, *one.skipped))]
+
+
+def check_no_wrench(
+    *, gain: bool, wrench_frame: str | None, force_scale: float, topics: Mapping[str, Collection[str]]
+) -> None:
+    """Refuse what needs the wrench, beside the wish to leave it out; arguments as of the extraction.
+
+    Raises:
+        ArgumentError: Something does.
+    """
+    needing = {"gain": gain, "wrench_frame": wrench_frame, "force_scale": force_scale != 1}
+    refuse_beside(
+        "`no_wrench` leaves out the wrench, which these need",
+        {**needing, "topic wrench": "wrench" in topics},
+        "`no_wrench`",
+    )
 
 
 def extract_recordings(
@@ -111,7 +129,7 @@ def extract_recordings(
         raise failed[0]
     if not good:
         kind = TruncatedError if all(isinstance(error, TruncatedError) for error in failed) else DemonstrationError
-        raise kind(f"none of the {len(failed)} logs can be used: {joined(_counted_reasons(failed))}")
+        raise kind(f"none of {counted(len(failed), 'log')} can be used: {joined(_counted_reasons(failed))}")
     return Recordings(
         tuple(extraction for _, extraction in good.values()),
         tuple(file for files, _ in good.values() for file in files),

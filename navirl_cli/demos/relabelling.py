@@ -10,7 +10,7 @@ import numpy as np
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.labels import Label, Labels
 from navirl_cli.demos.trials import SAME_START_S
-from navirl_cli.errors import LabelError
+from navirl_cli.errors import LabelError, counted
 
 #: Columns that change a path or its map, so that only an extraction can apply them.
 _OF_EXTRACTION = ("robot_radius_m", "people_m", "nominal_m")
@@ -69,7 +69,8 @@ def _matched(own: Sequence[Demonstration], rows: Sequence[Label], log: str) -> d
     if np.ptp(best) > SAME_START_S:
         raise LabelError(
             f"{rows[0].where}: expected the starts of the trials of {log} as inspect writes them, found several ways "
-            f"to place the table's {len(rows)} rows on its {len(own)} demonstrations; keep the rows of all its trials"
+            f"to place the table's {counted(len(rows), 'row')} on its {counted(len(own), 'demonstration')}; "
+            "keep the rows of all its trials, and relabel before trials are selected"
         )
     offset_s = float(np.median(best))
     found = {}

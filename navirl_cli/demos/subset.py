@@ -1,6 +1,6 @@
 """Which demonstrations of a file are meant: by condition, cycle, set, participant, trial."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from navirl_cli.demos.demonstration import Demonstration
@@ -13,7 +13,12 @@ FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
     "set": lambda one: one.set or "main task",
     "participant": lambda one: one.participant,
 }
-_FIELDS: Mapping[str, Callable[[Demonstration], str]] = {**FIELDS, "trial": lambda one: one.id}
+#: By what they are chosen, in the words of the options.
+_FIELDS: Mapping[str, Callable[[Demonstration], str]] = {
+    **FIELDS,
+    "cycle": lambda one: "" if one.cycle is None else str(one.cycle),
+    "trial": lambda one: one.id,
+}
 
 
 @dataclass(frozen=True)
@@ -30,9 +35,8 @@ class Subset:
 
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
-        """The names by field that chooses, as FIELDS gives them."""
-        cycles = tuple(f"cycle {number}" for number in self.cycle)
-        fields = {**vars(self), "cycle": cycles}
+        """The names by field that chooses, as the options take them."""
+        fields = {**vars(self), "cycle": tuple(map(str, self.cycle))}
         return {field: tuple(dict.fromkeys(own)) for field, own in fields.items() if own}
 
     def of(self, demonstrations: Sequence[Demonstration]) -> list[Demonstration]:
@@ -44,19 +48,27 @@ class Subset:
         """
         names = self.names
         for field, own in names.items():
-            known = _known(demonstrations, [field])
+            known = _known(demonstrations, field)
             for name in own:
+                if demonstrations and not known:
+                    raise DemonstrationError(f"`{field}`: expected {name}, found demonstrations without a {field}")
                 if demonstrations and name not in known:
                     raise DemonstrationError(unknown(f"`{field}`", name, known))
         chosen = [one for one in demonstrations if all(_FIELDS[field](one) in own for field, own in names.items())]
         if demonstrations and not chosen:
-            asked = ", ".join(" or ".join(own) for own in names.values())
+            asked = ", ".join(_together(field, " or ".join(own)) for field, own in names.items())
             fields = " and ".join(f"`{field}`" for field in names)
-            raise DemonstrationError(unknown(fields, asked, _known(demonstrations, names)))
+            there = {", ".join(_together(field, _FIELDS[field](one)) for field in names) for one in demonstrations}
+            raise DemonstrationError(unknown(fields, asked, sorted(there)))
         return chosen
 
 
-def _known(demonstrations: Sequence[Demonstration], fields: Collection[str]) -> list[str]:
-    """Names of several fields that occur together."""
-    found = dict.fromkeys(", ".join(_FIELDS[field](one) for field in fields) for one in demonstrations)
-    return list(found) if list(fields) == ["trial"] else sorted(found)
+def _known(demonstrations: Sequence[Demonstration], field: str) -> list[str]:
+    """Names of a field, without those that no option can choose."""
+    found = [name for name in dict.fromkeys(map(_FIELDS[field], demonstrations)) if name]
+    return found if field == "trial" else sorted(found)
+
+
+def _together(field: str, name: str) -> str:
+    """A name beside those of other fields, where a bare number would not say what it counts."""
+    return name if field != "cycle" else f"cycle {name}" if name else "no cycle"

@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 from navirl_cli.documents.tables import FORMULA
-from navirl_cli.errors import ArtefactError, brief
+from navirl_cli.errors import ArtefactError, brief, nearest
 from navirl_cli.files import read_regular
 
 #: Spreadsheets choose the separator by the language.
@@ -111,4 +111,6 @@ def _check_header(where: str, header: list[str], columns: Sequence[str], needed:
     for name in header:
         if name not in columns or header.count(name) > 1:
             what = "an unknown" if name not in columns else "a second"
-            raise ArtefactError(f"{where}: expected {expected}, found {what} column {brief(name)}; remove it")
+            near = [one for one in nearest(name, columns) if one not in header] if name not in columns else []
+            remedy = f"name it {near[0]}, or remove it" if near else "remove it"
+            raise ArtefactError(f"{where}: expected {expected}, found {what} column {brief(name)}; {remedy}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.subset import Subset
-from navirl_cli.errors import ArgumentError
+from navirl_cli.errors import ArgumentError, counted
 from navirl_cli.evaluation.groups import Trained, evidence_group_of
 
 
@@ -71,4 +71,6 @@ def _said(
     if len(kept) == len(demonstrations):
         return ""
     others = ", and those to compare with" if also else ""
-    return f"{len(kept)} of {len(demonstrations)} demonstrations: {which}{others}; `all` takes the others too"
+    return (
+        f"{len(kept)} of {counted(len(demonstrations), 'demonstration')}: {which}{others}; `all` takes the others too"
+    )

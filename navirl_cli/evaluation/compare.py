@@ -12,7 +12,8 @@ from navirl_cli.errors import SceneError
 from navirl_cli.evaluation.drawn import Drawn, Precision, Shown, draw, expected_here, expected_of
 from navirl_cli.evaluation.groups import GroupMetrics, Measured, by_group, group_of, summary_of
 from navirl_cli.evaluation.lines import Lines
-from navirl_cli.evaluation.metrics import NO_REWARD, PAPER_METRICS, Metric, Values, measure, missing_of
+from navirl_cli.evaluation.metric import NO_REWARD, Metric, Values, measure, missing_of
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.motion import PERSON_RADIUS_M, Drive
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene, avoidance_line_m, scenes_of

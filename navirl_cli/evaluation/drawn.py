@@ -9,7 +9,7 @@ import numpy as np
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import Metric, Need
+from navirl_cli.evaluation.metric import Metric, Need
 from navirl_cli.evaluation.policy_paths import Nearness, PolicyLines, Steps, Visits
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import SampledPaths, sample_paths

@@ -9,7 +9,7 @@ from navirl_cli.arrays import ByContent, FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.subset import FIELDS
 from navirl_cli.errors import DemonstrationError, unknown
-from navirl_cli.evaluation.metrics import Values
+from navirl_cli.evaluation.metric import Values
 
 #: Of all intervals.
 LEVEL = 0.95

@@ -64,11 +64,18 @@ class Drive:
         d = self.demonstration
         count = max(1, round(d.duration_s / STEP_S))
         at = (np.arange(count) + 0.5) / count * d.duration_s + d.t_s[0]
-        x, y = (np.interp(at, d.t_s, axis) for axis in d.xy_m.T)
-        distance = np.min([np.hypot(x - person[0], y - person[1]) for person in d.people_m], axis=0) - d.robot_radius_m
+        robot = np.stack([np.interp(at, d.t_s, axis) for axis in d.xy_m.T], axis=1)
+        away = [np.hypot(*(robot - _places(track, still, at)).T) for track, still in self._people]
+        distance = np.min(away, axis=0) - d.robot_radius_m
         limits = np.array([limit for _, limit in ZONES])
         zone: IntArray = (distance[:, None] >= limits).sum(axis=1)
         return zone
+
+    @property
+    def _people(self) -> list[tuple[PersonTrack | None, FloatArray]]:
+        """Track, where there is one, and mean place of each person."""
+        d = self.demonstration
+        return list(zip(d.tracks or (None,) * len(d.people_m), d.people_m, strict=True))
 
     @property
     def not_moving_s(self) -> float:
@@ -87,10 +94,9 @@ class Drive:
             return float("nan")
         at = d.t_s[0] + np.arange(len(velocity)) / RATE_HZ
         robot = np.stack([np.interp(at, d.t_s, axis) for axis in d.xy_m.T], axis=1)
-        tracks = d.tracks or (None,) * len(d.people_m)
         least = [
             touching_s(robot - there, velocity - own, d.robot_radius_m + PERSON_RADIUS_M)
-            for there, own in (_moving(track, still, at) for track, still in zip(tracks, d.people_m, strict=True))
+            for there, own in (_moving(track, still, at) for track, still in self._people)
         ]
         found = float(np.min(least))
         return found if np.isfinite(found) else float("nan")
@@ -135,11 +141,18 @@ class Drive:
         return derivatives(self.demonstration.t_s, self.demonstration.xy_m)
 
 
-def _moving(track: PersonTrack | None, still_m: FloatArray, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k, 2) places, m, and velocities, m/s, of a person at times; before and after a track the person stands."""
+def _places(track: PersonTrack | None, still_m: FloatArray, at_s: FloatArray) -> FloatArray:
+    """(k, 2) places of a person at times, m; before and after a track the person stands."""
     if track is None or not len(track.t_s):
-        return np.broadcast_to(still_m, (len(at_s), 2)), np.zeros((len(at_s), 2))
-    there = np.stack([np.interp(at_s, track.t_s, axis) for axis in track.xy_m.T], axis=1)
+        return np.broadcast_to(still_m, (len(at_s), 2))
+    return np.stack([np.interp(at_s, track.t_s, axis) for axis in track.xy_m.T], axis=1)
+
+
+def _moving(track: PersonTrack | None, still_m: FloatArray, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(k, 2) places, m, and velocities, m/s, of a person at times."""
+    there = _places(track, still_m, at_s)
+    if track is None or not len(track.t_s):
+        return there, np.zeros((len(at_s), 2))
     return there, derivatives(at_s, there)[0][: len(at_s)]
 
 

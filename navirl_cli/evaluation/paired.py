@@ -12,7 +12,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.evaluation.compare import DRIVEN, Comparison, learnt_type, name_in
 from navirl_cli.evaluation.groups import LEVEL, Measured, by_group, by_participant, mean_and_spread, student_half_width
-from navirl_cli.evaluation.metrics import Metric
+from navirl_cli.evaluation.metric import Metric
 
 RESAMPLES = 9999
 #: Fewer pairs have no bootstrap interval: their resampled means take only a handful of values.

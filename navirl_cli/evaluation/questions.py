@@ -13,7 +13,7 @@ from navirl_cli.evaluation.choice import choose
 from navirl_cli.evaluation.compare import Comparison, compare_files, name_in
 from navirl_cli.evaluation.drawn import Precision
 from navirl_cli.evaluation.groups import Trained, by_group
-from navirl_cli.evaluation.metrics import Metric
+from navirl_cli.evaluation.metric import Metric
 from navirl_cli.evaluation.paired import Paired, pairs_of_all
 from navirl_cli.evaluation.ranks import Ranking, check_to_rank, chosen_to_rank, ranking
 from navirl_cli.irl.reward import Reward

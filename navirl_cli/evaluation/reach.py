@@ -1,6 +1,7 @@
 """What the reach of people does to a fit: the same fit to all steps and to those within reach."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.reach import Reach, reach_of, reach_unknown
 from navirl_cli.errors import NavirlError
 from navirl_cli.evaluation.lines import Lines
+from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.likelihood import policy_of
 from navirl_cli.irl.paths import sample_paths
@@ -36,7 +38,12 @@ class ReachEffect:
 
 
 def reach_effect(
-    demonstrations: Sequence[Demonstration], found: Fit, steps: Steps, reach_m: float | None = None
+    demonstrations: Sequence[Demonstration],
+    found: Fit,
+    steps: Steps,
+    reach_m: float | None = None,
+    evidence: Evidence | None = None,
+    executor: Executor | None = None,
 ) -> ReachEffect | None:
     """Fit again to all steps, and to those in contact or within reach, whichever was not done, and compare.
 
@@ -47,6 +54,8 @@ def reach_effect(
         found: The fit to them, without a bias correction.
         steps: Of this fit.
         reach_m: The person's reach; None for that of the contacts.
+        evidence: Of the fit; its scenes are not built again.
+        executor: Where to sum over many scenes; by default this process.
 
     Returns:
         The comparison; None where contacts are unknown, nobody is there to push, or nobody pushed and no reach is
@@ -56,24 +65,29 @@ def reach_effect(
     reach = reach_of(demonstrations) if reach_m is None else Reach(reach_m)
     if reach is None or not people or reach_unknown(demonstrations):
         return None
+    scenes = [] if evidence is None else [part.scene for part in evidence.scenes]
     rewards: dict[Steps, Reward | None] = {}
     counts: dict[Steps, int] = {}
     for which in (Steps.ALL, Steps.REACHABLE):
         try:
-            selected = with_steps(demonstrations, which, reach.reach_m)
+            selected = with_steps(demonstrations, which, reach.reach_m, scenes)
         except NavirlError:  # no step is within reach
             return None
         counts[which] = selected.evidence.steps
         same = which is steps or counts[which] == counts[Steps.ALL] == found.steps
         try:
-            rewards[which] = (
-                found if same else fit(selected.evidence, found.reward, found.l2, prior=found.prior, scan=False)
-            ).reward
+            rewards[which] = found.reward if same else _again(selected.evidence, found, executor)
         except NavirlError:
             rewards[which] = None
     known = {reward: _least_distance_m(people, reward) for reward in rewards.values() if reward is not None}
     both = [None if reward is None else known[reward] for reward in rewards.values()]
     return ReachEffect(reach, counts[Steps.REACHABLE], counts[Steps.ALL], both[0], both[1])
+
+
+def _again(evidence: Evidence, found: Fit, executor: Executor | None) -> Reward:
+    """The reward of a fit to other steps, which starts at a given one."""
+    with evidence.kept_by(executor) as kept:
+        return fit(kept, found.reward, found.l2, prior=found.prior, scan=False).reward
 
 
 def _least_distance_m(people: Sequence[Demonstration], reward: Reward) -> float | None:

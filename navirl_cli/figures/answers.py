@@ -20,7 +20,7 @@ from matplotlib.textpath import text_to_path
 from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.figures.sheet import common_legend
-from navirl_cli.figures.style import INK, house_style, level_colours, panel_width_in
+from navirl_cli.figures.style import house_style, level_colours, look, panel_width_in
 from navirl_cli.study.questionnaire import Shares
 
 #: Ends of the scale.
@@ -88,12 +88,12 @@ def draw_answers(axes: Axes, bars: Sequence[Shares]) -> DrawnAnswers:
     levels = share.shape[1]
     disagreement = share[:, : levels // 2].sum(axis=1) + (share[:, levels // 2] / 2 if levels % 2 else 0.0)
     left = np.cumsum(share, axis=1) - share - disagreement[:, None]
-    look: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.5, "clip_on": False}
+    edge: dict[str, Any] = {"edgecolor": look().ink, "linewidth": 0.5, "clip_on": False}
     drawn = [
-        axes.barh(at, share[:, level], _BAR_IN, left[:, level], color=colour, **look)
+        axes.barh(at, share[:, level], _BAR_IN, left[:, level], color=colour, **edge)
         for level, colour in enumerate(level_colours(levels))
     ]
-    axes.axvline(0.0, color=INK, linewidth=0.8, zorder=0)
+    axes.axvline(0.0, color=look().ink, linewidth=0.8, zorder=0)
     axes.set_ylim(height_in, 0.0)
     beside_pt = _name_modalities(axes, at, bars)
     questions = _name_questions(axes, middles, bars, beside_pt)
@@ -104,7 +104,7 @@ def draw_answers(axes: Axes, bars: Sequence[Shares]) -> DrawnAnswers:
     _scale(axes, left.min(), (left + share).max(), width_in)
     names = [f"1 {DISAGREE}", *map(str, range(2, levels)), f"{levels} {AGREE}"]
     patches = [
-        Patch(facecolor=colour, label=name, **look) for colour, name in zip(level_colours(levels), names, strict=True)
+        Patch(facecolor=colour, label=name, **edge) for colour, name in zip(level_colours(levels), names, strict=True)
     ]
     return DrawnAnswers(axes, drawn, questions, numbers, common_legend([axes], patches))
 
@@ -158,10 +158,10 @@ def _places(bars: Sequence[Shares], width_in: float) -> tuple[FloatArray, FloatA
     return np.concatenate(at), middles, float(heights.sum())
 
 
-def _beside(axes: Axes, **look: Any) -> dict[str, Any]:
+def _beside(axes: Axes, **others: Any) -> dict[str, Any]:
     """Placement of a text beside the axes: x as a share of their width, y in data, shifted by points."""
     place = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points", "annotation_clip": False}
-    return {**place, "va": "center", **look}
+    return {**place, "va": "center", **others}
 
 
 def _name_modalities(axes: Axes, at: FloatArray, bars: Sequence[Shares]) -> float:
@@ -176,8 +176,8 @@ def _name_questions(axes: Axes, middles: FloatArray, bars: Sequence[Shares], bes
     """Write every question left of the modalities."""
     texts = [_wrapped(question, _ASKED, panel_width_in(axes)) for question, _ in _by_question(bars)]
     shift = -(_width_pt(texts) + beside_pt + _GAP_PT * (1.5 if beside_pt else 0.5))
-    look = _beside(axes, fontsize=rcParams["ytick.labelsize"], ha="left", linespacing=1.1)
-    return [axes.annotate(text, (0.0, y), (shift, 0.0), **look) for text, y in zip(texts, middles, strict=True)]
+    place = _beside(axes, fontsize=rcParams["ytick.labelsize"], ha="left", linespacing=1.1)
+    return [axes.annotate(text, (0.0, y), (shift, 0.0), **place) for text, y in zip(texts, middles, strict=True)]
 
 
 def _width_pt(texts: Iterable[str]) -> float:

@@ -60,6 +60,8 @@ class CellOptions(TypedDict, total=False):
     title: str
     #: Whether to put a legend below; default True.
     legend: bool
+    #: Whether to put a colour bar beside or above; default True.
+    scale: bool
     #: Whether people hide the colours below them; by default those of the policy where no visits are.
     opaque_people: bool
 
@@ -76,7 +78,8 @@ class DrawnCells:
     obstacles: AxesImage
     nominal: Line2D
     people: list[Circle]
-    colour_bar: Colorbar
+    #: None where another map has it.
+    colour_bar: Colorbar | None
     marks: Marks
     #: One for each path over the map.
     overlays: list[Line2D]
@@ -104,7 +107,7 @@ def draw_policy(axes: Axes, scene: Scene, visits: FloatArray, **options: Unpack[
     # Unlikely cells have the background's colour. Likely paths stand out and print well.
     colours = colormaps[look().intensity].with_extremes(under=look().paper, bad=(0, 0, 0, 0))
     image = draw_image(axes, scene, visits, norm, colours)
-    bar = draw_bar(axes, image, window, VISITS, extend="min")
+    bar = draw_bar(axes, image, window, VISITS, extend="min") if options.get("scale", True) else None
     # People are filled where that hides no visits.
     inside_people = np.zeros(len(visits), dtype=bool)
     for person in scene.people_m:
@@ -140,7 +143,7 @@ def draw_reward(axes: Axes, scene: Scene, reward_by_cell: FloatArray, **options:
     spanned, seen = reward_by_cell[near if near.any() else shown], reward_by_cell[shown]
     image = draw_image(axes, scene, reward_by_cell, Normalize(spanned.min(), spanned.max()), REWARD_MAP)
     ends = bool(seen.min() < spanned.min()), bool(seen.max() > spanned.max())
-    bar = draw_bar(axes, image, window, REWARD, extend=EXTEND[ends])
+    bar = draw_bar(axes, image, window, REWARD, extend=EXTEND[ends]) if options.get("scale", True) else None
     return draw_scene(image, bar, scene, window, **options)
 
 
@@ -213,17 +216,22 @@ def draw_bar(axes: Axes, image: ScalarMappable, window: Window, label: str, exte
     length_in = (panel_width_in(axes) - _BESIDE_IN) * (1.0 if above else shape)
     bar.set_label(fill(label, max(_SHORTEST, int(length_in / _LETTER_IN))))
     bar.outline.set_linewidth(0.5)
-    if isinstance(image.norm, LogNorm):
-        bar.formatter = FuncFormatter(lambda value, _: f"{value:g}")
-        bar.minorformatter = NullFormatter()
+    plain_numbers(bar)
     if above:
         bar.ax.xaxis.set_ticks_position("top")
         bar.ax.xaxis.set_label_position("top")
     return bar
 
 
+def plain_numbers(bar: Colorbar) -> None:
+    """Write the numbers of a logarithmic colour bar without powers."""
+    if isinstance(bar.norm, LogNorm):
+        bar.formatter = FuncFormatter(lambda value, _: f"{value:g}")
+        bar.minorformatter = NullFormatter()
+
+
 def draw_scene(
-    image: AxesImage, bar: Colorbar, scene: Scene, window: Window, **options: Unpack[CellOptions]
+    image: AxesImage, bar: Colorbar | None, scene: Scene, window: Window, **options: Unpack[CellOptions]
 ) -> DrawnCells:
     """Draw everything over an image of cells, and the frame around it."""
     obstacles, nominal, marks, lines = draw_over(image.axes, scene, window, **options)

@@ -18,7 +18,7 @@ from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.groups import group_of
 from navirl_cli.figures.ground import Window, cropped_to, window_around
 from navirl_cli.figures.paths import DrawnPaths, draw_paths
-from navirl_cli.figures.scale import free_place, write_beside
+from navirl_cli.figures.scale import SCALE, below, write_beside
 from navirl_cli.figures.sheet import common_legend
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
@@ -143,11 +143,11 @@ def _arrow() -> dict[str, Any]:
 
 
 def _reference(axes: Axes, window: Window, newtons: float, scale: float) -> None:
-    """Draw an arrow of a round force in a free corner, with its number."""
+    """Draw an arrow of a round force below the left end of the map, with its number."""
     length = newtons * scale
-    middle, top, _ = free_place(axes, window, length)
-    axes.quiver(middle[0] - length / 2, middle[1], length, 0.0, color=look().ink, zorder=7, **_arrow())
-    write_beside(axes, f"{newtons:g} N", middle, top=top)
+    look_of: dict[str, Any] = {"color": look().ink, "clip_on": False, "label": SCALE, **_arrow()}
+    axes.quiver(window[0], 0.0, length, 0.0, transform=below(axes), **look_of)
+    write_beside(axes, f"{newtons:g} N", window[0] + length, left=False)
 
 
 def _over_time(axes: Axes, one: Demonstration, force_n: FloatArray) -> list[Line2D]:

@@ -45,7 +45,7 @@ class Marks:
     goals: Line2D | None
     beyond: list[Line2D]
     nominal: Line2D | None
-    #: None where it would hide what is drawn.
+    #: None where a narrow panel has no room for it.
     scale_bar: Line2D | None
     #: People of whom at least a part is visible.
     seen: list[Circle]
@@ -66,7 +66,7 @@ class Marks:
             handles.append(_disc("robot", look().paper, _ROBOT_PT))
         if self.seen:
             alike = len({str(one.get_linestyle()) for one in self.seen}) == 1
-            label = f"person ({len(self.seen)} places)" if alike else "person (line style of path)"
+            label = f"person ({len(self.seen)} places)" if alike else "person (outlined like its paths)"
             label = label if self.filled and len(self.seen) > 1 else "person"
             handles.append(_disc(label, look().person if self.discs else "none", self.seen[0].get_linewidth()))
         return [*handles, Patch(facecolor=look().obstacle, edgecolor="none", label="obstacle, inflated")]
@@ -99,7 +99,7 @@ def draw_marks(
     people = draw_people(axes, places.people_m, filled=nominal is None or opaque, on_colours=nominal is not None)
     for outline, line in zip(people, lines, strict=False):
         outline.set_linestyle(line)
-    robots = draw_starts(axes, places.starts_m, places.robot_radius_m)[1]
+    robots = draw_starts(axes, places.starts_m, places.robot_radius_m, on_colours=nominal is not None)[1]
     goals, beyond = draw_goals(axes, places.goals_m, window)
     frame(axes, window, title)
     bar = draw_scale_bar(axes, window)
@@ -130,16 +130,20 @@ def draw_people(axes: Axes, people_m: FloatArray, *, filled: bool, on_colours: b
     return outlines
 
 
-def draw_starts(axes: Axes, starts_m: FloatArray, robot_radius_m: float | None) -> tuple[Line2D, list[Circle]]:
+def draw_starts(
+    axes: Axes, starts_m: FloatArray, robot_radius_m: float | None, *, on_colours: bool = False
+) -> tuple[Line2D, list[Circle]]:
     """Mark (k, 2) starts, m, map frame, with the robot's outline to scale if its radius is known.
 
-    Starts within a radius of each other share an outline.
+    Starts within a radius of each other share an outline, which is visible on any colour where that is wanted.
 
     Returns:
         The markers and the outlines.
     """
     outlines: list[Circle] = []
     line: dict[str, Any] = {"fill": False, "edgecolor": look().ink, "linewidth": _ROBOT_PT, "zorder": 5}
+    if on_colours:
+        line["path_effects"] = (withStroke(linewidth=1.8, foreground=look().paper),)
     for x, y in starts_m if robot_radius_m else ():
         if all(np.hypot(x - o.center[0], y - o.center[1]) >= robot_radius_m for o in outlines):
             outlines.append(Circle((x, y), robot_radius_m or 0.0, **line))

@@ -11,6 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import Number, counted
 from navirl_cli.evaluation.compare import LEARNT
 from navirl_cli.evaluation.groups import by_group
 from navirl_cli.evaluation.motion import PERSON_RADIUS_M
@@ -66,11 +67,15 @@ def driven(
     if everywhere:
         shown = [other for other in demonstrations if _map_of(other) == _map_of(one)]
         left = len(demonstrations) - len(shown)
-        return shown, f"`overlay` all: {left} paths on other maps are left out" if left else ""
+        return (
+            shown,
+            f"`overlay` all: {left} path{Number(left):|s} on other maps {Number(left):is|are} left out" if left else "",
+        )
     shown = [other for other in alike(demonstrations, one) if other.participant == one.participant]
     left = len(demonstrations) - len(shown)
     note = (
-        f"`overlay` demos: {len(shown)} of {len(demonstrations)} paths, those of {one.participant} in the scene of "
+        f"`overlay` demos: {len(shown)} of {counted(len(demonstrations), 'path')}, those of {one.participant} "
+        f"in the scene of "
         f"{one.id}; `overlay` all draws the others too"
     )
     return shown, note if left else ""

@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.lines import Line2D
+
 from navirl_cli.arrays import FloatArray
 from navirl_cli.evaluation.compare import LEARNT
-from navirl_cli.figures.cells import draw_policy, likely_window
+from navirl_cli.figures.cells import VISITS, DrawnCells, draw_policy, likely_window
+from navirl_cli.figures.marks import merged_handles
 from navirl_cli.figures.overlay import Overlay
-from navirl_cli.figures.sheet import new_figure, save_figure
-from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, house_style
+from navirl_cli.figures.policies import share_colours
+from navirl_cli.figures.sheet import common_legend, new_figure, save_figure
+from navirl_cli.figures.style import COLUMN_IN, PAGE_IN, colour_of, house_style
 from navirl_cli.planning.paths import Planner
 
 
@@ -28,29 +32,43 @@ def draw_plan(output: Path, planner: Planner, lines_m: Sequence[FloatArray], *, 
 
 
 @house_style()
-def draw_plans(output: Path, plans: Sequence[tuple[str, Planner, Sequence[FloatArray]]], *, force: bool) -> None:
-    """The same of several scenes, a panel for each.
+def draw_plans(
+    output: Path, plans: Sequence[tuple[str, Planner, Sequence[FloatArray]]], *, force: bool
+) -> list[DrawnCells]:
+    """The same of several scenes, a panel for each, with one colour bar and one legend for all.
 
     Args:
         output: The file: .png, .pdf or .svg.
         plans: Title, policy and planned paths of each scene.
         force: Whether to replace an existing file.
 
+    Returns:
+        The artists of each panel.
+
     Raises:
         ArtefactError: The file cannot be written.
     """
-    columns = min(len(plans), 2)
+    alone, columns = len(plans) == 1, min(len(plans), 2)
     figure, axes = new_figure(COLUMN_IN if columns == 1 else PAGE_IN, None, len(plans), columns)
+    drawn = []
     for panel, (title, planner, lines_m) in zip(axes, plans, strict=True):
         scene = planner.problem.scene
-        draw_policy(
-            panel,
-            scene,
-            planner.visits,
-            robot_radius_m=planner.problem.robot_radius_m,
-            window_m=likely_window(scene, planner.visits, list(lines_m)),
-            overlays=[Overlay("planned", LEARNT, lines_m)],
+        drawn.append(
+            draw_policy(
+                panel,
+                scene,
+                planner.visits,
+                robot_radius_m=planner.problem.robot_radius_m,
+                window_m=likely_window(scene, planner.visits, list(lines_m)),
+                overlays=[Overlay("planned", LEARNT, lines_m)],
+                title=title,
+                legend=alone,
+                scale=alone,
+            )
         )
-        if title:
-            panel.set_title(title)
+    if not alone:
+        drawn = share_colours(drawn, VISITS)
+        path = Line2D([], [], color=colour_of(LEARNT), linewidth=1.0, label="planned")
+        common_legend(axes, [path, *merged_handles([one.marks for one in drawn])])
     save_figure(figure, output, force=force)
+    return drawn

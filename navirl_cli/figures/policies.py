@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from textwrap import fill
 from typing import Any
 
@@ -9,10 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 
 from navirl_cli.errors import SceneError
-from navirl_cli.figures.cells import EXTEND, REWARD, VISITS, DrawnCells, draw_policy, draw_reward
+from navirl_cli.figures.cells import EXTEND, REWARD, VISITS, DrawnCells, draw_policy, draw_reward, plain_numbers
 from navirl_cli.figures.ground import Window
+from navirl_cli.figures.layout import PAD_IN
 from navirl_cli.figures.marks import merged_handles
-from navirl_cli.figures.sheet import PAD_IN, common_legend, outer_labels
+from navirl_cli.figures.sheet import common_legend, outer_labels
 from navirl_cli.figures.style import house_style, panel_width_in
 from navirl_cli.irl.solved import SolvedScene
 
@@ -57,7 +59,7 @@ def draw_policy_and_reward(
     if not scenes:
         raise SceneError("no scene to draw")
     policies, rewards = [], []
-    look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False, "opaque_people": False}
+    look: dict[str, Any] = {"robot_radius_m": robot_radius_m, "legend": False, "scale": False, "opaque_people": False}
     for (title, one), left, right in zip(scenes, axes[::2], axes[1::2], strict=True):
         policies.append(draw_policy(left, one.scene, one.visits, window_m=window_m, **look))
         rewards.append(draw_reward(right, one.scene, one.reward_by_cell, window_m=policies[-1].window_m, **look))
@@ -67,24 +69,35 @@ def draw_policy_and_reward(
     for rows in [axes] if alike else [axes[at : at + 2] for at in range(0, len(axes), 2)]:
         outer_labels(rows)
     handles = merged_handles([drawn.marks for drawn in policies])
-    return DrawnPolicies(_share(policies, VISITS), _share(rewards, REWARD), common_legend(axes, handles))
+    return DrawnPolicies(share_colours(policies, VISITS), share_colours(rewards, REWARD), common_legend(axes, handles))
 
 
-def _share(drawn: Sequence[DrawnCells], label: str) -> list[DrawnCells]:
-    """Give all panels the same range of colours, and one common colour bar above them."""
+def share_colours(drawn: Sequence[DrawnCells], label: str) -> list[DrawnCells]:
+    """Give maps without colour bars the same range of colours, and one common colour bar above them.
+
+    Args:
+        drawn: Maps of one quantity, in one or in several columns.
+        label: Of the colour bar.
+
+    Returns:
+        The maps, each with the colour bar.
+    """
     clims = [one.image.get_clim() for one in drawn]
     low, high = min(clim[0] for clim in clims), max(clim[1] for clim in clims)
     tables = [table for one in drawn if (table := one.image.get_array()) is not None]
     ends = any(table.min() < low for table in tables), any(table.max() > high for table in tables)
-    first, panels, window = drawn[0].colour_bar, [one.axes for one in drawn], drawn[0].window_m
+    panels, window = [one.axes for one in drawn], drawn[0].window_m
     for one in drawn:
-        one.colour_bar.remove()
         one.image.set_clim(low, high)
-    width_in = panel_width_in(panels[0])
-    height_in = len(drawn) * (width_in - _BESIDE_IN) * (window[3] - window[2]) / (window[1] - window[0])
+    specs = [spec for panel in panels if (spec := panel.get_subplotspec()) is not None]
+    columns = max(1, len({spec.colspan.start for spec in specs}))
+    width_in = columns * panel_width_in(panels[0])
+    map_in = panel_width_in(panels[0]) - _BESIDE_IN
+    height_in = ceil(len(drawn) / columns) * map_in * (window[3] - window[2]) / (window[1] - window[0])
     place: dict[str, Any] = {"location": "top", "pad": PAD_IN / height_in, "aspect": width_in / _BAR_IN}
-    look: dict[str, Any] = {"extend": EXTEND[ends], "extendfrac": 0.03, "format": first.formatter}
+    look: dict[str, Any] = {"extend": EXTEND[ends], "extendfrac": 0.03}
     bar = panels[0].figure.colorbar(drawn[0].image, ax=panels, **place, **look)
+    plain_numbers(bar)
     bar.outline.set_linewidth(0.5)
     bar.set_label(fill(label, int((width_in - _BESIDE_IN) / _LETTER_IN)), labelpad=4.0)
     return [replace(one, colour_bar=bar) for one in drawn]

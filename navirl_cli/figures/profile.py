@@ -2,15 +2,17 @@
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from math import ceil, nan
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from navirl_cli.documents.numbers import evenly
 from navirl_cli.errors import ArtefactError, unknown
 from navirl_cli.figures.sheet import new_figure
-from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look, panel_width_in
+from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 from navirl_cli.irl.profile import Profile, fall_at
 
 #: The curve is drawn down to this multiple of the fall at the interval's ends.
@@ -46,10 +48,10 @@ def chosen_profiles(profiles: Sequence[Profile], names: Collection[str]) -> list
 
 
 def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_in: float) -> Figure:
-    """Draw profile likelihoods side by side.
+    """Draw profile likelihoods side by side, in as many rows as they need to be legible.
 
     Args:
-        profiles: From left to right, at least one.
+        profiles: From left to right, row by row, at least one.
         units: Units of the parameters by name; empty or missing for a dimensionless parameter.
         width_in: Width of the figure, inches; COLUMN_IN or PAGE_IN for a paper.
 
@@ -57,22 +59,18 @@ def draw_profiles(profiles: Sequence[Profile], units: Mapping[str, str], width_i
         The figure, of the height that it needs.
 
     Raises:
-        ArtefactError: More profiles than are legible at this width, or a flat profile.
+        ArtefactError: A flat profile.
     """
-    count = len(profiles)
-    if width_in / count < NARROWEST_IN:
-        wider = "set `wide`, or name" if PAGE_IN / count >= NARROWEST_IN else "name"
-        raise ArtefactError(
-            f"{count} profiles side by side are not legible in {width_in:g} in: expected "
-            f"{int(width_in / NARROWEST_IN)} at most; {wider} fewer with `parameter`"
-        )
-    height_in = min(width_in / count * ASPECT + (MORE_IN if count > 1 else 0.0), TALLEST_IN)
-    figure, axes = new_figure(width_in, height_in, count)
-    for one, panel in zip(profiles, axes, strict=True):
+    rows = ceil(len(profiles) / int(width_in / NARROWEST_IN))
+    columns = ceil(len(profiles) / rows)
+    height_in = min(width_in / columns * ASPECT + (MORE_IN if columns > 1 else 0.0), TALLEST_IN)
+    figure, axes = new_figure(width_in, rows * height_in, len(profiles), columns)
+    for number, (one, panel) in enumerate(zip(profiles, axes, strict=True)):
         draw_profile(panel, one, units.get(one.name, ""))
-        if panel is not axes[0]:
+        if number % columns:
+            first = axes[number - number % columns]
             panel.set_ylabel("")
-            panel.tick_params(labelleft=panel.get_ylim() != axes[0].get_ylim())
+            panel.tick_params(labelleft=panel.get_ylim() != first.get_ylim())
     return figure
 
 
@@ -126,8 +124,9 @@ def _write(axes: Axes, profile: Profile, best: float, unit: str) -> None:
     symbol = symbol_of(profile.name)
     axes.set_xlabel(symbol + (f" [{unit.replace('^2', '²')}]" if unit else ""), parse_math=True)
     axes.set_ylabel("relative log-likelihood [nats]" if alone else "relative\nlog-likelihood [nats]")
-    ends = ["open" if end is None else f"{end:.3g}" for end in (profile.lower, profile.upper)]
-    text = (" " if alone else "\n").join((f"{symbol} = {best:.3g}", f"({ends[0]} to {ends[1]})"))
+    value, *ends = evenly([best, *(nan if end is None else end for end in (profile.lower, profile.upper))])
+    low, high = ("open" if end == "nan" else end for end in ends)
+    text = (" " if alone else "\n").join((f"{symbol} = {value}", f"({low} to {high})"))
     axes.set_title(text.replace("-", "\N{MINUS SIGN}"), parse_math=True, fontsize=7 if narrow else None)
     axes.xaxis.set_major_locator(MaxNLocator(3 if narrow else 5, steps=[1, 2, 5, 10]))
     axes.ticklabel_format(axis="x", scilimits=(-3, 4))

@@ -19,7 +19,8 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, ON_GRID
 from navirl_cli.evaluation.groups import GroupMetrics
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric, Values
+from navirl_cli.evaluation.metric import Metric, Values
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
 #: Notes below the panels.
@@ -29,8 +30,8 @@ BARS_NOTE = "bars: mean, whiskers: standard deviation"
 _NEAR_ZERO = 0.4
 #: Diameter of a point, and width of its interval and of the standard deviation, points.
 _POINT_PT, _THICK_PT, _THIN_PT = 5.0, 3.2, 0.8
-#: Largest share of a figure's width for the bars' labels; mean width of a letter, inches.
-_LABELLED, _LETTER_IN = 0.25, 0.055
+#: Largest share of a figure's width for the bars' labels, and where panels are stacked; width of a letter, inches.
+_LABELLED, _LABELLED_ALONE, _LETTER_IN = 0.25, 0.4, 0.055
 #: Height of a line of text, and distance between two bars, inches.
 _LINE_IN, _BETWEEN_IN = 0.125, 0.06
 #: Height of the labels below the bars; panels narrower than this, inches, have labels in lines of so many letters.
@@ -98,16 +99,20 @@ def _half(row: GroupMetrics) -> Values:
     return row.half_interval or {name: _NORMAL * error for name, error in row.error.items()}
 
 
-def height_for(bars: Sequence[PropertyBar], width_in: float) -> float:
-    """Height of a figure of these bars in which no labels overlap, inches.
+def property_layout(bars: Sequence[PropertyBar], width_in: float, *, stacked: bool = False) -> dict[str, Any]:
+    """Panels, columns and height of a figure of these bars in which no labels overlap.
 
     Args:
         bars: The bars.
         width_in: Width of the figure, inches.
+        stacked: Whether the panels are one above the other, each with the labels of the bars.
     """
-    most = max((_label(bar, width_in).count("\n") + 1 for bar in bars), default=1)
-    below = _BELOW_IN + (_LINE_IN if width_in / len(PAPER_METRICS) < _NARROW_IN else 0.0)
-    return below + len(bars) * (most * _LINE_IN + _BETWEEN_IN)
+    columns = 1 if stacked else len(PAPER_METRICS)
+    most = max((_label(bar, width_in, columns).count("\n") + 1 for bar in bars), default=1)
+    below = _BELOW_IN + (_LINE_IN if width_in / columns < _NARROW_IN else 0.0)
+    rows = len(PAPER_METRICS) // columns
+    height_in = rows * (below + len(bars) * (most * _LINE_IN + _BETWEEN_IN))
+    return {"panels": len(PAPER_METRICS), "columns": columns, "height_in": height_in}
 
 
 @house_style()
@@ -119,8 +124,8 @@ def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar], *, as_bar
     people in scenes without people, is marked "n/a".
 
     Args:
-        axes: One for each of PAPER_METRICS, side by side, :func:`height_for` inches high with labels. The first has the
-            labels of the rows.
+        axes: One for each of PAPER_METRICS, of a figure as of :func:`property_layout`. The first of each row has the
+            labels of the bars.
         bars: From top to bottom.
         as_bars: Draw bars in place of points.
 
@@ -141,19 +146,22 @@ def draw_properties(axes: Sequence[Axes], bars: Sequence[PropertyBar], *, as_bar
             drawn.points.append(point)
             drawn.intervals.append(interval)
             drawn.spreads.append(spread)
-    width_in = panel_width_in(axes[0]) * len(axes)
-    axes[0].set_yticks(range(len(bars)), [_label(bar, width_in) for bar in bars])
+    spec = axes[0].get_subplotspec()
+    columns = len(axes) if spec is None else spec.get_gridspec().ncols
+    width_in = panel_width_in(axes[0]) * columns
+    for panel in axes[::columns]:
+        panel.set_yticks(range(len(bars)), [_label(bar, width_in, columns) for bar in bars])
     axes[0].figure.supxlabel(fill(BARS_NOTE if as_bars else NOTE, int(width_in / _LETTER_IN)), fontsize="small")
     return drawn
 
 
-def _label(bar: PropertyBar, width_in: float) -> str:
+def _label(bar: PropertyBar, width_in: float, columns: int) -> str:
     """A bar's label with its number of paths, in lines that leave room for the panels.
 
     A number stays on the line of its word: "cycle 2".
     """
     label = re.sub(r"(?<=\w) (?=\d)|(?<=n) (?==)|(?<==) ", "\N{NO-BREAK SPACE}", f"{bar.label} (n = {bar.count})")
-    letters = int(_LABELLED * width_in / _LETTER_IN)
+    letters = int((_LABELLED if columns > 1 else _LABELLED_ALONE) * width_in / _LETTER_IN)
     return fill(label, letters, break_long_words=False, break_on_hyphens=False)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,15 @@ from navirl_cli.arrays import FloatArray
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.evaluation.ranks import GroupRanks
 from navirl_cli.figures.ground import legend_below
+from navirl_cli.figures.sheet import common_legend
 from navirl_cli.figures.style import PAGE_IN, colour_of, house_style, look
 
+#: From this p on, two decimals are enough.
+_TWO_DIGITS = 0.095
 #: Opacity of the band.
 _OPACITY = 0.18
-#: Height over width of a panel, and height of its texts, inches.
-_ASPECT, _AROUND_IN = 0.6, 0.85
+#: Height over width of a panel.
+_ASPECT = 0.6
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,9 @@ class DrawnRanks:
 
 
 @house_style()
-def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.95, group: str = "") -> DrawnRanks:
+def draw_ranks(
+    axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.95, group: str = "", *, legend: bool = True
+) -> DrawnRanks:
     """Draw the distribution of ranks and the uniform one, which demonstrations from the policy have.
 
     Steps above the diagonal at low ranks are demonstrations that are improbable under the policy. Steps far below it
@@ -50,6 +54,7 @@ def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.9
         p_value: Of the Kolmogorov-Smirnov test for uniform ranks.
         level: Probability of the band.
         group: Of the demonstrations, for the title.
+        legend: Whether to put a legend below.
 
     Returns:
         The artists.
@@ -76,24 +81,21 @@ def draw_ranks(axes: Axes, ranks: FloatArray, p_value: float, level: float = 0.9
     (steps,) = axes.step(x, y, where="post", color=colour, linewidth=1.4, label=label, zorder=3)
     axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="rank among the policy's paths", ylabel="share of demonstrations")
     axes.set_box_aspect(_ASPECT)
-    shown = "p < 0.001" if p_value < 1e-3 else f"p = {p_value:.2g}"
+    shown = "p < 0.001" if p_value < 1e-3 else f"p = {p_value:.{2 if p_value >= _TWO_DIGITS else 3}f}"
     above = f"{group}\n" if group else ""
     axes.set_title(f"{above}n = {count}, {shown} (Kolmogorov-Smirnov)")
-    legend_below(axes, [steps, uniform, band])
+    if legend:
+        legend_below(axes, [steps, uniform, band])
     return DrawnRanks(axes, steps, uniform, band, reach)
 
 
 def rank_layout(panels: int, width_in: float) -> dict[str, Any]:
     """Panels, columns and height of a figure of ranks, for a number of groups and a width in inches."""
-    columns = 2 if width_in >= PAGE_IN and panels > 1 else 1
-    rows = ceil(panels / columns)
-    # one panel: as high as it needs
-    height_in = None if panels == 1 else rows * (_ASPECT * width_in / columns + _AROUND_IN)
-    return {"panels": panels, "columns": columns, "height_in": height_in}
+    return {"panels": panels, "columns": 2 if width_in >= PAGE_IN and panels > 1 else 1, "height_in": None}
 
 
 def draw_rank_panels(axes: Sequence[Axes], groups: Sequence[GroupRanks]) -> list[DrawnRanks]:
-    """A panel for each group: conditions are never pooled.
+    """A panel for each group, with one legend for all: conditions are never pooled.
 
     Args:
         axes: One for each group.
@@ -102,7 +104,12 @@ def draw_rank_panels(axes: Sequence[Axes], groups: Sequence[GroupRanks]) -> list
     Returns:
         The artists of each panel.
     """
-    return [
-        draw_ranks(one, np.array([rank.rank for rank in own.ranks]), own.uniformity()[1], group=own.name)
+    alone = len(groups) == 1
+    drawn = [
+        draw_ranks(one, np.array([rank.rank for rank in own.ranks]), own.uniformity()[1], group=own.name, legend=alone)
         for one, own in zip(axes, groups, strict=True)
     ]
+    if not alone:
+        widest = min(drawn, key=lambda one: one.reach)
+        common_legend(axes, [widest.steps, widest.uniform, widest.band])
+    return drawn

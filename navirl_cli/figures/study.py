@@ -3,18 +3,17 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.evaluation.groups import by_group
-from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.figures import answers, properties, times
-from navirl_cli.figures.conditions import draw_path_panels
-from navirl_cli.figures.policies import TitledScene, draw_policy_and_reward
-from navirl_cli.figures.sheet import new_figure, save_figure, settle
-from navirl_cli.figures.style import COLUMN_IN, PAGE_IN
+from navirl_cli.figures.report import draw_conditions, draw_property_panels, draw_scenes
+from navirl_cli.figures.screens import Drawing, save_for_screens
+from navirl_cli.figures.sheet import new_figure
+from navirl_cli.figures.style import COLUMN_IN
 from navirl_cli.parallel import map_in_order
 from navirl_cli.reports.study import FIGURES
 from navirl_cli.study.pipeline import Study
@@ -32,6 +31,7 @@ def draw_study(
     pooled: PooledPolicy,
     bars: Sequence[Shares],
     folder: Path,
+    page: Path,
     *,
     force: bool,
     progress: Callable[[int, str], None] | None = None,
@@ -44,84 +44,65 @@ def draw_study(
         pooled: Where the pooled reward leads.
         bars: Answers to a questionnaire; may be empty.
         folder: Where to write NAME.png and NAME.pdf; names as in :data:`navirl_cli.reports.study.FIGURES`.
+        page: Where to write the same for dark and for narrow screens.
         force: Replace existing files. Files of an earlier run without data now are deleted.
         progress: Called with the number of figures drawn and the name of the last.
         executor: Where to draw; by default local processes.
 
     Returns:
-        The .png file of each figure drawn.
+        The .png files of the figures drawn, with the names of :func:`navirl_cli.figures.screens.save_for_screens`.
     """
+    # Before other processes begin, so that these need not import it each: it brings what makes subsets of fonts.
+    import_module("matplotlib.backends.backend_pdf")
     wanted = _wanted(study, pooled, bars)
     for name in FIGURES if force else ():
         for extension in () if name in wanted else FORMATS:
             (folder / f"{name}.{extension}").unlink(missing_ok=True)
-    paths = {}
-    for name in map_in_order(partial(_saved, folder=folder, force=force), list(wanted.items()), executor):
-        paths[name] = folder / f"{name}.png"
+    files: dict[str, Path] = {}
+    draw = partial(_saved, folder=folder, page=page, force=force)
+    for done, own in enumerate(map_in_order(draw, list(wanted.items()), executor), 1):
+        files |= own
         if progress is not None:
-            progress(len(paths), name)
-    return paths
+            progress(done, next(iter(own)))
+    return files
 
 
-def _saved(job: tuple[str, Callable[[], _Drawn]], folder: Path, *, force: bool) -> str:
-    """Draw one figure and save it in all formats."""
-    name, draw = job
-    figure, trim = draw()
-    settle(figure, trim=trim)
-    for extension in FORMATS:
-        save_figure(figure, folder / f"{name}.{extension}", force=force, trim=False)
-    return name
+def _saved(job: tuple[str, Drawing], folder: Path, page: Path, *, force: bool) -> dict[str, Path]:
+    """Draw one figure and save it for all screens, and as a vector file."""
+    return save_for_screens(job[1], job[0], folder, page, formats=FORMATS, force=force)
 
 
-def _wanted(study: Study, pooled: PooledPolicy, bars: Sequence[Shares]) -> dict[str, Callable[[], _Drawn]]:
+def _wanted(study: Study, pooled: PooledPolicy, bars: Sequence[Shares]) -> dict[str, Drawing]:
     """The figures for which there are data."""
-    wanted: dict[str, Callable[[], _Drawn]] = {}
+    wanted: dict[str, Drawing] = {}
     if study.completion_s:
-        wanted["fig2_completion_times"] = partial(_completion, study)
+        wanted["fig2_completion_times"] = Drawing(partial(_completion, study), COLUMN_IN)
     by_hand = {
         name: own for name, own in by_group(study.demonstrations).items() if own[0].condition.value != "autonomous"
     }
     alone = {name: own for name, own in by_group(study.demonstrations).items() if name not in by_hand}
     for name, groups in (("fig3_paths", by_hand), ("fig5_replays", alone)):
         if groups:
-            wanted[name] = partial(_paths, list(groups.items()))
+            wanted[name] = Drawing(partial(draw_conditions, list(groups.items())))
     if bars:
-        wanted["fig4_answers"] = partial(_answers, bars)
+        wanted["fig4_answers"] = Drawing(partial(_answers, bars))
     if study.groups:
-        wanted["fig7_properties"] = partial(_properties, study)
+        rows = properties.bars_of(study.groups, learnt_from=())
+        wanted["fig7_properties"] = Drawing(partial(draw_property_panels, rows))
     for name, scenes in (("fig8_pooled", pooled.seen), ("fig9_unseen", pooled.unseen)):
         if scenes:
-            wanted[name] = partial(_policies, scenes, study.seconds[0].robot_radius_m)
+            wanted[name] = Drawing(partial(draw_scenes, scenes, study.seconds[0].robot_radius_m))
     return wanted
 
 
-def _completion(study: Study) -> _Drawn:
-    figure, (axes,) = new_figure(COLUMN_IN, times.HEIGHT_IN)
+def _completion(study: Study, width_in: float) -> _Drawn:
+    figure, (axes,) = new_figure(width_in, times.HEIGHT_IN)
     every = {modality: [t for own in known.values() for t in own] for modality, known in study.completion_s.items()}
     times.draw_completion_times(axes, every)
     return figure, False
 
 
-def _paths(panels: Sequence[tuple[str, Sequence[Demonstration]]]) -> _Drawn:
-    figure, axes = new_figure(PAGE_IN, panels=len(panels), columns=min(2, len(panels)))
-    draw_path_panels(axes, panels)
-    return figure, True
-
-
-def _answers(bars: Sequence[Shares]) -> _Drawn:
-    figure, (axes,) = new_figure(PAGE_IN, answers.height_for(bars, PAGE_IN))
+def _answers(bars: Sequence[Shares], width_in: float) -> _Drawn:
+    figure, (axes,) = new_figure(width_in, answers.height_for(bars, width_in))
     answers.draw_answers(axes, bars)
     return figure, False
-
-
-def _properties(study: Study) -> _Drawn:
-    bars = properties.bars_of(study.groups, learnt_from=())
-    figure, axes = new_figure(PAGE_IN, properties.height_for(bars, PAGE_IN), len(PAPER_METRICS))
-    properties.draw_properties(axes, bars)
-    return figure, False
-
-
-def _policies(scenes: Sequence[TitledScene], robot_radius_m: float) -> _Drawn:
-    figure, axes = new_figure(PAGE_IN, panels=2 * len(scenes), columns=2)
-    draw_policy_and_reward(axes, scenes, robot_radius_m)
-    return figure, True

@@ -114,6 +114,9 @@ FONTS: Mapping[str, tuple[str, str, float]] = MappingProxyType(
 )
 _FONT: ContextVar[str] = ContextVar("font", default="sans")
 
+#: Look and font that matplotlib's settings have at present.
+_SET: ContextVar[tuple[Look, str] | None] = ContextVar("set", default=None)
+
 #: Colour map of a scale from disagreement over neutral to agreement, and its ends. The end of agreement is darker: the
 #: two sides stay distinct in grey print.
 _LEVELS_MAP, _LEVELS_FROM, _LEVELS_TO = "PuOr", 0.14, 0.95
@@ -184,8 +187,14 @@ def styled(name: str, font: str = "sans", dpi: int | None = None) -> Iterator[No
 def house_style() -> Iterator[None]:
     """Matplotlib's defaults with this style on top, within the context or the decorated call.
 
-    A matplotlibrc of the user does not change the figures. Earlier settings are restored afterwards.
+    A matplotlibrc of the user does not change the figures. Earlier settings are restored afterwards. Within another
+    such context with the same look and font nothing is to do.
     """
+    wanted = look(), _FONT.get()
+    if _SET.get() == wanted:
+        yield
+        return
+    token = _SET.set(wanted)
     with mpl.rc_context(), warnings.catch_warnings():
         # of a character without a glyph save_figure gives one note, in place of a warning at every measuring
         warnings.filterwarnings("ignore", r"Glyph \d+ ")
@@ -195,7 +204,10 @@ def house_style() -> Iterator[None]:
         mpl.rcParams.update({"font.family": [family], "mathtext.fontset": mathematics})
         for part, colour in (("ink", look().ink), ("paper", look().paper)):
             mpl.rcParams.update(dict.fromkeys(_COLOURED[part], colour))
-        yield
+        try:
+            yield
+        finally:
+            _SET.reset(token)
 
 
 def line_spacing() -> float:

@@ -13,8 +13,9 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator, NullLocator
 
 from navirl_cli.arrays import FloatArray
+from navirl_cli.documents.numbers import evenly
 from navirl_cli.errors import DemonstrationError
-from navirl_cli.figures.style import INK, colour_of, house_style, panel_width_in
+from navirl_cli.figures.style import colour_of, house_style, look, panel_width_in
 
 #: Note below the boxes.
 NOTE = "box: median and quartiles, whiskers: within 1.5 IQR, dots: all times"
@@ -36,7 +37,7 @@ _DOT_PT, _BESIDE_IN, _ABOVE = 3.2, 0.055, 0.035
 _OPACITY = 0.55
 #: Width of a letter below the boxes, and of the axis beside them, inches.
 _LETTER_IN, _AXIS_IN = 0.055, 0.45
-_LINE: dict[str, Any] = {"color": INK, "linewidth": 0.8}
+_LINE_PT = 0.8
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,32 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
                 f"completion times of {modality}: expected seconds above 0, found {values.tolist()}"
             )
     room_in = (panel_width_in(axes) - _AXIS_IN) / len(times)
-    box, line = {"edgecolor": INK, "linewidth": 0.8}, {**_LINE, "solid_capstyle": "butt"}
-    drawn = axes.boxplot(
+    drawn = _boxes(axes, times, room_in)
+    everything = np.concatenate(list(times.values()))
+    highest, lowest = float(everything.max()), float(everything.min())
+    logarithmic = highest > _LONG * float(np.median(everything))
+    span = np.log(highest / lowest) if logarithmic else highest
+    dots = [
+        _dots(axes, at, values, span, room_in, np.log if logarithmic else np.asarray)
+        for at, values in enumerate(times.values())
+    ]
+    medians = [float(np.median(values)) for values in times.values()] if room_in >= _NUMBERED_IN else []
+    written = zip(medians, evenly(medians), strict=True)
+    numbers = [_number(axes, at, median, text) for at, (median, text) in enumerate(written)]
+    _label(axes, times, room_in)
+    if logarithmic:
+        _logarithmic(axes, lowest, highest)
+    else:
+        axes.set_ylim(0.0, 1.06 * highest)
+    return DrawnTimes(axes, numbers, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
+
+
+def _boxes(axes: Axes, times: Mapping[str, FloatArray], room_in: float) -> dict[str, Any]:
+    """Draw a box with whiskers for each modality, left of its middle; the artists by kind."""
+    ink = look().ink
+    box = {"edgecolor": ink, "linewidth": _LINE_PT}
+    line = {"color": ink, "linewidth": _LINE_PT, "solid_capstyle": "butt"}
+    drawn: dict[str, Any] = axes.boxplot(
         list(times.values()),
         positions=[at + _LEFT for at in range(len(times))],
         widths=min(_BOXED, _BOX_IN / room_in),
@@ -96,28 +121,13 @@ def draw_completion_times(axes: Axes, times_s: Mapping[str, Sequence[float]]) ->
     )
     for patch, modality in zip(drawn["boxes"], times, strict=True):
         patch.set_facecolor((colour_of(modality), _OPACITY))
-    everything = np.concatenate(list(times.values()))
-    highest, lowest = float(everything.max()), float(everything.min())
-    logarithmic = highest > _LONG * float(np.median(everything))
-    span = np.log(highest / lowest) if logarithmic else highest
-    dots = [
-        _dots(axes, at, values, span, room_in, np.log if logarithmic else np.asarray)
-        for at, values in enumerate(times.values())
-    ]
-    named = times.values() if room_in >= _NUMBERED_IN else ()
-    numbers = [_number(axes, at, float(np.median(values))) for at, values in enumerate(named)]
-    _label(axes, times, room_in)
-    if logarithmic:
-        _logarithmic(axes, lowest, highest)
-    else:
-        axes.set_ylim(0.0, 1.06 * highest)
-    return DrawnTimes(axes, numbers, drawn["boxes"], drawn["medians"], drawn["whiskers"], dots)
+    return drawn
 
 
-def _number(axes: Axes, at: int, median: float) -> Annotation:
+def _number(axes: Axes, at: int, median: float, text: str) -> Annotation:
     """Write a median left of its box."""
     place: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "center", "fontsize": "small"}
-    return axes.annotate(f"{median:.3g}", (at + _LEFT - _BOXED / 2, median), (-2.0, 0.0), **place)
+    return axes.annotate(text, (at + _LEFT - _BOXED / 2, median), (-2.0, 0.0), **place)
 
 
 def _logarithmic(axes: Axes, lowest: float, highest: float) -> None:
@@ -140,8 +150,10 @@ def _dots(
     """Draw all sorted times of one modality right of its box, in a line where no other dot is near on the axis."""
     ranks = _ranks(scale(times), _ABOVE * span)
     beside = min(_BESIDE_IN / room_in, _DOTTED / max(1, int(np.ptp(ranks))))
-    look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.6, "zorder": 4}
-    (drawn,) = axes.plot(at + _RIGHT + beside * ranks, times, linestyle="none", marker="o", markersize=_DOT_PT, **look)
+    edge: dict[str, Any] = {"markerfacecolor": look().paper, "markeredgecolor": look().ink, "markeredgewidth": 0.6}
+    (drawn,) = axes.plot(
+        at + _RIGHT + beside * ranks, times, linestyle="none", marker="o", markersize=_DOT_PT, zorder=4, **edge
+    )
     return drawn
 
 

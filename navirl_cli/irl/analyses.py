@@ -1,13 +1,13 @@
 """Analyses of a fit: bias, bootstrap, profile likelihoods, prediction of left-out participants."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from navirl_cli.arrays import ByContent, FloatArray
-from navirl_cli.errors import ArgumentError, NavirlError
+from navirl_cli.errors import ArgumentError, NavirlError, refuse_beside
 from navirl_cli.irl.bias import corrected, expected_bias
 from navirl_cli.irl.bootstrap import Bootstrap, bootstrap
 from navirl_cli.irl.evidence import Evidence
@@ -63,39 +63,52 @@ class Questions:
         Raises:
             ArgumentError: The analyses exclude each other, the prior, the steps or the regulariser.
         """
-        if self.pool is Pool.PERSONS and (prior or self._of_one_reward):
-            raise ArgumentError(
-                "`pool` persons has its own intervals and errors, and no prior: leave out `prior`, `correct_bias`, "
-                "`intervals`, `bootstrap`, `profile` and `cross_validate`"
+        if self.pool is Pool.PERSONS:
+            refuse_beside(
+                "`pool` persons has intervals of its own and no prior",
+                {"prior": prior, **self._of_one_reward},
+                "ask for them in another fit without `pool`",
             )
         if self.person is not None and not prior:
-            raise ArgumentError("`person` goes with `prior`, a reward that was fitted with `pool` persons")
-        if self.person is not None and self._of_one_reward:
             raise ArgumentError(
-                "`person` has its own intervals: leave out `correct_bias`, `intervals`, `bootstrap`, `profile` and "
-                "`cross_validate`"
+                "`person` goes with `prior`, a reward that was fitted with `pool` persons; name it, or choose the "
+                "demonstrations with `participant` to learn from them alone"
             )
-        if self.cross_validate and prior:
-            raise ArgumentError(
-                "`cross_validate` and `prior` exclude each other: the prior may know the participant who is left out"
+        if self.person is not None:
+            refuse_beside(
+                "`person` has intervals of its own",
+                self._of_one_reward,
+                "ask for them in a fit to these demonstrations alone, with `participant`, not `person` and `prior`",
             )
-        if self.correct_bias and (
-            prior or steps is not Steps.ALL or self.bootstrap or self.profiles or self.cross_validate
-        ):
+        if self.cross_validate:
+            why = "`cross_validate` predicts participants whom the prior may know"
+            refuse_beside(why, {"prior": prior}, "`cross_validate`")
+        if self.correct_bias:
+            self._check_correction({"prior": prior, "steps": steps is not Steps.ALL}, l2)
+
+    def _check_correction(self, needs: Mapping[str, bool], l2: float) -> None:
+        """Refuse what the correction of the bias excludes; arguments and errors as of :meth:`check_arguments`."""
+        refuse_beside("`correct_bias` corrects a fit to all steps without a prior", needs, "`correct_bias`")
+        refuse_beside(
+            "`correct_bias` changes the values, and these analyses are of the fit before",
+            self._of_the_fit,
+            "ask for them in another fit without `correct_bias`",
+        )
+        if l2 > PAPER_L2:
             raise ArgumentError(
-                "`correct_bias` needs all steps and no prior, and the other analyses belong to the uncorrected fit: "
-                "leave out `prior`, `steps`, `bootstrap`, `profile` and `cross_validate`"
-            )
-        if self.correct_bias and l2 > PAPER_L2:
-            raise ArgumentError(
-                f"`correct_bias` corrects maximum likelihood: expected `l2` <= {PAPER_L2:g}, found {l2:g}"
+                f"`correct_bias` corrects maximum likelihood: expected `l2` <= {PAPER_L2:g}, found {l2:g}; lower it, "
+                "or leave out `correct_bias`"
             )
 
     @property
-    def _of_one_reward(self) -> bool:
-        """Whether something is asked that only a fit of one reward for all can answer."""
-        asked = self.correct_bias or self.bootstrap or self.profiles or self.cross_validate
-        return bool(asked) or self.intervals is not None
+    def _of_the_fit(self) -> dict[str, object]:
+        """The analyses of a fit as it is, by name."""
+        return {"bootstrap": self.bootstrap, "profile": self.profiles, "cross_validate": self.cross_validate}
+
+    @property
+    def _of_one_reward(self) -> dict[str, object]:
+        """What only a fit of one reward for all can answer, by name."""
+        return {"correct_bias": self.correct_bias, "intervals": self.intervals, **self._of_the_fit}
 
     def check(self, evidence: Evidence, start: Reward) -> None:
         """Refuse requests that these data cannot answer, before the fit.
@@ -168,21 +181,23 @@ def answers(
     lost: list[str] = []
     drawn = validation = None
     followed = []
-    measured, bias = _measured(evidence, found, questions, bars, lost), None
-    if questions.correct_bias:
-        with _kept(lost):
-            found = corrected(evidence, found)
-        measured = tuple(one.moved(found) for one in measured)
-    elif whole_paths:
-        bias = expected_bias(evidence, found)
+    bias = None
+    with evidence.kept_by(executor) as kept:
+        measured = _measured(kept, found, questions, bars, lost)
+        if questions.correct_bias:
+            with _kept(lost):
+                found = corrected(kept, found)
+            measured = tuple(one.moved(found) for one in measured)
+        elif whole_paths:
+            bias = expected_bias(kept, found)
     if found.status is Status.CONVERGED and measured and measured[0].is_open:
         found = replace(found, status=Status.OPEN_INTERVAL)
     if questions.bootstrap:
         with _kept(lost), bars("bootstrap", questions.bootstrap) as update:
             drawn = bootstrap(evidence, found, questions.bootstrap, questions.seed, executor=executor, progress=update)
     for name in dict.fromkeys(questions.profiles):
-        with _kept(lost), bars("profile", None) as update:
-            followed.append(profile(evidence, found, name, progress=update))
+        with _kept(lost), bars("profile", None) as update, evidence.kept_by(executor) as kept:
+            followed.append(profile(kept, found, name, progress=update))
     if questions.cross_validate:
         with _kept(lost), bars("cross-validation", len(evidence.people)) as update:
             validation = cross_validate(evidence, found.initial, found.l2, executor=executor, progress=update)

@@ -7,6 +7,7 @@ from functools import partial
 from statistics import NormalDist
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import DemonstrationError
@@ -40,6 +41,11 @@ class Bootstrap(ByContent):
     def identified_draws(self) -> IntArray:
         """(k,) number of replicates that identify each parameter."""
         return np.asarray(np.isfinite(self.theta).sum(axis=0))
+
+    @property
+    def accelerated(self) -> NDArray[np.bool_]:
+        """(k,) whether every fit without one participant identifies the parameter: its acceleration is known."""
+        return np.asarray(np.isfinite(self.without_one).all(axis=0))
 
     @property
     def standard_errors(self) -> FloatArray:

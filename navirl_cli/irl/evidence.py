@@ -1,7 +1,11 @@
 """The demonstrated steps that a reward is learnt from, by scene."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +16,15 @@ from navirl_cli.demos.grid import moves_along
 from navirl_cli.errors import DemonstrationError
 from navirl_cli.irl.graph import NO_MOVE, Graph
 from navirl_cli.irl.scene import Scene, scenes_of
+from navirl_cli.teams import Ask, team
+
+#: Scenes in a block, the sums over which are added up. Numbers in files depend on it, by rounding.
+BLOCK: Final = 16
+#: Cells of all scenes below which workers take longer to start than they save, in the 40 evaluations of a fit.
+ENOUGH_CELLS: Final = 100_000
+
+Given = TypeVar("Given")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +57,10 @@ class SceneEvidence:
         return replace(self, **arrays)
 
 
+#: Scenes whose sums are added up before those of others.
+Block: TypeAlias = tuple[SceneEvidence, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """Demonstrated steps, by scene. A step that is repeated counts each time."""
@@ -51,6 +68,49 @@ class Evidence:
     scenes: tuple[SceneEvidence, ...]
     #: By demonstration, including those without a selected step.
     participants: tuple[str, ...]
+    #: Asks the workers that keep the blocks (:meth:`kept_by`); None where this process works on them.
+    ask: Ask[Any, Any] | None = field(default=None, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross process borders without workers."""
+        return Evidence, (self.scenes, self.participants)
+
+    @cached_property
+    def blocks(self) -> list[Block]:
+        """The scenes in runs of BLOCK, whichever process works on them."""
+        return [self.scenes[low : low + BLOCK] for low in range(0, len(self.scenes), BLOCK)]
+
+    def by_block(self, work: Callable[[Block, Given], Result], given: Given) -> list[Result]:
+        """Apply a function to every block: at the workers that keep them, or here.
+
+        Args:
+            work: Importable by name. Called with a block and what is given.
+            given: Passed to other processes.
+
+        Returns:
+            Results in the order of the scenes, so that their sum does not depend on who works on them.
+
+        Raises:
+            WorkerLostError: Processes of workers ended twice.
+        """
+        if self.ask is None:
+            return [work(block, given) for block in self.blocks]
+        return self.ask((work, given))
+
+    @contextmanager
+    def kept_by(self, executor: Executor | None) -> Iterator["Evidence"]:
+        """The same evidence with its blocks at workers, which build what a scene needs once and keep it.
+
+        Args:
+            executor: Local processes or a cluster. Where it is neither, or there is too little to do, this process
+                works on all blocks.
+        """
+        sizes = [float(sum(part.scene.lattice.size for part in block)) for block in self.blocks]
+        if executor is None or len(sizes) < 2 or sum(sizes) < ENOUGH_CELLS:
+            yield self
+            return
+        with team(executor, _applied, self.blocks, sizes) as ask:
+            yield replace(self, ask=ask)
 
     @property
     def count(self) -> int:
@@ -121,15 +181,25 @@ class Evidence:
         left = tuple(part for part in parts if len(part.state))
         if not left:
             raise DemonstrationError("no step is left to learn from")
-        return replace(self, scenes=left)
+        return Evidence(left, self.participants)
 
     def uniform_log_likelihood(self) -> float:
         """Log-likelihood of the steps when every possible move is equally likely."""
         return -sum(float(np.log(part.scene.lattice.possible[part.state].sum(axis=1)).sum()) for part in self.scenes)
 
 
-def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
+def _applied(block: Block, asked: tuple[Callable[[Block, Any], Any], Any]) -> Any:
+    """What a worker does with a block: call a function with it and with what is given."""
+    work, given = asked
+    return work(block, given)
+
+
+def evidence_of(demonstrations: Sequence[Demonstration], known: Collection[Scene] = ()) -> Evidence:
     """Collect the steps of demonstrations by scene.
+
+    Args:
+        demonstrations: The demonstrations.
+        known: As in :func:`navirl_cli.irl.scene.scenes_of`.
 
     Raises:
         SceneError: A demonstration's scene has no path from start to goal.
@@ -138,7 +208,7 @@ def evidence_of(demonstrations: Sequence[Demonstration]) -> Evidence:
     if not demonstrations:
         raise DemonstrationError("no demonstration to learn from")
     steps: dict[Scene, list[tuple[IntArray, IntArray, int]]] = {}
-    scenes = scenes_of(demonstrations)
+    scenes = scenes_of(demonstrations, known)
     for owner, (demonstration, scene) in enumerate(zip(demonstrations, scenes, strict=True)):
         states = scene.lattice.states_of(demonstration.cells)
         if (states[:-1] == scene.goal).any():

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IndexArray, IntArray
 
 if TYPE_CHECKING:
     from navirl_cli.irl.lattice import Lattice
 
 #: Places of steps in flat (n, 8) arrays, states that they leave, and where the steps to each state begin.
-Steps: TypeAlias = tuple[IntArray, NDArray[np.int32], NDArray[np.int32]]
+Steps: TypeAlias = tuple[IndexArray, IndexArray, IndexArray]
 #: In place of the incoming move where a path begins.
 NO_MOVE = 8
 
@@ -113,7 +113,7 @@ class Graph(ABC):
         return csr_array((full[taken], sources, starts), shape=(self.size, self.size))
 
 
-def steps_by_target(neighbours: IntArray, chosen: NDArray[np.bool_]) -> Steps:
+def steps_by_target(neighbours: IntArray | IndexArray, chosen: NDArray[np.bool_]) -> Steps:
     """Some of the steps of a graph, sorted by the state that they lead to.
 
     Args:
@@ -126,7 +126,7 @@ def steps_by_target(neighbours: IntArray, chosen: NDArray[np.bool_]) -> Steps:
     """
     from scipy.sparse import csr_array
 
-    taken = np.flatnonzero(chosen)
+    taken = np.flatnonzero(chosen).astype(np.int32)
     starts = np.concatenate([[0], np.cumsum(chosen.sum(axis=1))]).astype(np.int32)
     targets = neighbours.ravel()[taken].astype(np.int32)
     turned = csr_array((taken, targets, starts), shape=(len(neighbours), len(neighbours))).tocsc()

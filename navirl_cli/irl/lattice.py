@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -26,10 +27,14 @@ class Lattice(Graph):
     #: Orders of the cells by goal, for all scenes on it: thousands of scenes share few goals.
     _orderings: dict[int, Ordering] = field(default_factory=dict, init=False, repr=False)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross process borders as the map: what is computed from it is larger, and is computed again."""
+        return Lattice.around, (self.grid, self.cells[0])
+
     def ordering_to(self, goal: int) -> Ordering:
         """The states by the length of their shortest 8-connected path to a goal, m; always the same object."""
         if goal not in self._orderings:
-            cheapest = np.full(self.size, self.grid.resolution_m)
+            cheapest = np.broadcast_to(self.grid.resolution_m, self.size)
             self._orderings[goal] = Ordering(self, goal, self.costs_to(goal, self.step_m), cheapest)
         return self._orderings[goal]
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navirl_cli.arrays import ByContent, FloatArray, IntArray
-from navirl_cli.irl.evidence import Evidence, SceneEvidence
+from navirl_cli.irl.evidence import Block, Evidence, SceneEvidence
 from navirl_cli.irl.graph import Graph
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
@@ -65,11 +65,7 @@ def policy_of(reward: Reward, scene: Scene) -> Policy:
 
 def log_likelihood(evidence: Evidence, reward: Reward) -> float:
     """Log-likelihood alone, without derivatives."""
-    total = 0.0
-    for part in evidence.scenes:
-        jet, policy, steps = _solved(part, reward)
-        total += float(steps.values(jet, policy).sum())
-    return total
+    return sum(evidence.by_block(_log_likelihood, reward))
 
 
 def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, FloatArray]:
@@ -79,10 +75,9 @@ def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, Float
         InfinitePartitionError: The partition function is infinite in one of the scenes.
     """
     value, gradient = 0.0, np.zeros(len(reward.theta))
-    for part in evidence.scenes:
-        jet, policy, steps = _solved(part, reward)
-        value += float(steps.values(jet, policy).sum())
-        gradient += steps.features(jet.first).sum(axis=0) - steps.flow(policy) @ _means(jet.first, policy)
+    for one, slope in evidence.by_block(_value_and_gradient, reward):
+        value += one
+        gradient += slope
     return value, gradient
 
 
@@ -98,15 +93,11 @@ def likelihood(evidence: Evidence, reward: Reward) -> Likelihood:
     """
     k = len(reward.theta)
     value, hessian, scores, information = 0.0, np.zeros((k, k)), np.zeros((evidence.count, k)), np.zeros((k, k))
-    for part in evidence.scenes:
-        jet, policy, steps = _solved(part, reward)
-        value += float(steps.values(jet, policy).sum())
-        slope = policy.expected_to_goal(_means(jet.first, policy))
-        for j, one in enumerate(steps.gradients(jet, slope).T):
-            scores[:, j] += np.bincount(part.owner, one, minlength=evidence.count)
-        expected, bend = _curvature(steps, jet, policy, slope)
-        information += expected
-        hessian += bend - expected
+    for block in evidence.by_block(_likelihood, reward):
+        value += block.value
+        scores[block.owners] += block.scores
+        information += block.information
+        hessian += block.hessian
     return Likelihood(value, scores.sum(axis=0), hessian, scores, information)
 
 
@@ -116,11 +107,7 @@ def step_likelihood(evidence: Evidence, reward: Reward) -> StepLikelihood:
     Raises:
         InfinitePartitionError: The partition function is infinite in one of the scenes.
     """
-    values, gradients = [], []
-    for part in evidence.scenes:
-        jet, policy, steps = _solved(part, reward)
-        values.append(steps.values(jet, policy))
-        gradients.append(steps.gradients(jet, policy.expected_to_goal(_means(jet.first, policy))))
+    values, gradients = zip(*evidence.by_block(_step_likelihood, reward), strict=True)
     owners, numbers = (
         np.concatenate([getattr(part, name) for part in evidence.scenes]) for name in ("owner", "number")
     )
@@ -129,11 +116,7 @@ def step_likelihood(evidence: Evidence, reward: Reward) -> StepLikelihood:
 
 def feature_sums(evidence: Evidence, reward: Reward) -> FloatArray:
     """(k,) sums of the features dr/dtheta over the demonstrated steps."""
-    sums = [
-        _Steps.of(part, reward.ordering(part.scene).graph).features(reward.on(part.scene).first).sum(axis=0)
-        for part in evidence.scenes
-    ]
-    return np.asarray(np.sum(sums, axis=0))
+    return np.asarray(np.sum(evidence.by_block(_feature_sums, reward), axis=0))
 
 
 def path_covariance(evidence: Evidence, reward: Reward) -> tuple[FloatArray, list[tuple[int, int]]]:
@@ -147,15 +130,96 @@ def path_covariance(evidence: Evidence, reward: Reward) -> tuple[FloatArray, lis
         (k + p, k + p) of the k first derivatives of the reward and the p second ones that are not zero everywhere; the
         pairs of parameters that these belong to.
     """
-    pairs = sorted({pair for part in evidence.scenes for pair in reward.on(part.scene).second})
+    pairs = sorted(set().union(*evidence.by_block(_bent_pairs, reward)))
     k = len(reward.theta)
     total = np.zeros((k + len(pairs), k + len(pairs)))
-    for part in evidence.scenes:
+    for block in evidence.by_block(_path_covariance, (reward, pairs)):
+        total += block
+    return total, pairs
+
+
+@dataclass(frozen=True, eq=False)
+class _BlockLikelihood:
+    """As :class:`Likelihood`, of a block; rows of scores belong to the demonstrations ``owners``."""
+
+    value: float
+    hessian: FloatArray
+    owners: IntArray
+    scores: FloatArray
+    information: FloatArray
+
+
+def _log_likelihood(block: Block, reward: Reward) -> float:
+    """:func:`log_likelihood` of a block."""
+    total = 0.0
+    for part in block:
+        jet, policy, steps = _solved(part, reward)
+        total += float(steps.values(jet, policy).sum())
+    return total
+
+
+def _value_and_gradient(block: Block, reward: Reward) -> tuple[float, FloatArray]:
+    """:func:`value_and_gradient` of a block."""
+    value, gradient = 0.0, np.zeros(len(reward.theta))
+    for part in block:
+        jet, policy, steps = _solved(part, reward)
+        value += float(steps.values(jet, policy).sum())
+        gradient += steps.features(jet.first).sum(axis=0) - steps.flow(policy) @ _means(jet.first, policy)
+    return value, gradient
+
+
+def _likelihood(block: Block, reward: Reward) -> _BlockLikelihood:
+    """:func:`likelihood` of a block."""
+    k, owners = len(reward.theta), np.unique(np.concatenate([part.owner for part in block]))
+    value, hessian, scores, information = 0.0, np.zeros((k, k)), np.zeros((len(owners), k)), np.zeros((k, k))
+    for part in block:
+        jet, policy, steps = _solved(part, reward)
+        value += float(steps.values(jet, policy).sum())
+        slope = policy.expected_to_goal(_means(jet.first, policy))
+        rows = np.searchsorted(owners, part.owner)
+        for j, one in enumerate(steps.gradients(jet, slope).T):
+            scores[:, j] += np.bincount(rows, one, minlength=len(owners))
+        expected, bend = _curvature(steps, jet, policy, slope)
+        information += expected
+        hessian += bend - expected
+    return _BlockLikelihood(value, hessian, owners, scores, information)
+
+
+def _step_likelihood(block: Block, reward: Reward) -> tuple[FloatArray, FloatArray]:
+    """Values and gradients of :func:`step_likelihood` of a block."""
+    values, gradients = [], []
+    for part in block:
+        jet, policy, steps = _solved(part, reward)
+        values.append(steps.values(jet, policy))
+        gradients.append(steps.gradients(jet, policy.expected_to_goal(_means(jet.first, policy))))
+    return np.concatenate(values), np.concatenate(gradients)
+
+
+def _feature_sums(block: Block, reward: Reward) -> FloatArray:
+    """:func:`feature_sums` of a block."""
+    sums = [
+        _Steps.of(part, reward.ordering(part.scene).graph).features(reward.on(part.scene).first).sum(axis=0)
+        for part in block
+    ]
+    return np.asarray(np.sum(sums, axis=0))
+
+
+def _bent_pairs(block: Block, reward: Reward) -> set[tuple[int, int]]:
+    """Pairs of parameters by which the reward has second derivatives somewhere in a block."""
+    return {pair for part in block for pair in reward.on(part.scene).second}
+
+
+def _path_covariance(block: Block, asked: tuple[Reward, Sequence[tuple[int, int]]]) -> FloatArray:
+    """:func:`path_covariance` of a block, by reward and pairs of parameters."""
+    reward, pairs = asked
+    size = len(reward.theta) + len(pairs)
+    total = np.zeros((size, size))
+    for part in block:
         jet, policy, steps = _solved(part, reward)
         features = [*jet.first, *(jet.second.get(pair, np.zeros((1, 1))) for pair in pairs)]
         slope = policy.expected_to_goal(_means(features, policy))
         total += _covariance(features, policy, slope, policy.probability * steps.flow(policy)[:, None])
-    return total, pairs
+    return total
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,6 +94,11 @@ class Models(ByContent):
         return next(model for model in self.models if model.terms == PAPER_TERMS)
 
 
+def with_paper(models: Sequence[tuple[Term, ...]]) -> list[tuple[Term, ...]]:
+    """Models, each once, and the paper's, to which the others are compared."""
+    return list(dict.fromkeys([*models, *([] if PAPER_TERMS in models else [PAPER_TERMS])]))
+
+
 def compare_models(
     evidence: Evidence,
     models: Sequence[tuple[Term, ...]],
@@ -109,13 +114,13 @@ def compare_models(
         models: Sums of terms. The paper's is added where it is missing.
         l2: Regulariser of the fits.
         executor: Where to compute; by default local processes.
-        progress: Called with the number of fits done.
+        progress: Called with the number of fits done, and the model of the last one.
 
     Raises:
         DemonstrationError: There is one participant only.
     """
     names = evidence.several_people("models")
-    chosen = list(dict.fromkeys([*models, *([] if PAPER_TERMS in models else [PAPER_TERMS])]))
+    chosen = with_paper(models)
     jobs = [(terms, name) for terms in chosen for name in ("", *names)]
     results: list[_Result] = []
     for result in map_in_order(partial(_learn, evidence, l2), jobs, executor):

@@ -5,9 +5,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from navirl_cli.arrays import FloatArray, IntArray
+from navirl_cli.arrays import FloatArray, IndexArray, IntArray
 from navirl_cli.irl.graph import Graph, steps_by_target
 
 
@@ -23,24 +22,22 @@ class Ordering:
     step: FloatArray
 
     @cached_property
-    def order(self) -> IntArray:
+    def order(self) -> IndexArray:
         """(n,) state at every rank."""
-        order: IntArray = np.argsort(self.distance, kind="stable")
-        return order
+        return np.argsort(self.distance, kind="stable").astype(np.int32)
 
     @cached_property
-    def rank(self) -> IntArray:
+    def rank(self) -> IndexArray:
         """(n,) rank of every state."""
         rank = np.empty_like(self.order)
         rank[self.order] = np.arange(self.graph.size)
         return rank
 
     @cached_property
-    def neighbours(self) -> IntArray:
+    def neighbours(self) -> IndexArray:
         """(n, 8) rank that each move leads to from every rank, -1 where the move is not possible."""
         neighbours = self.graph.neighbours[self.order]
-        ranks: IntArray = np.where(neighbours >= 0, self.rank[neighbours], -1)
-        return ranks
+        return np.where(neighbours >= 0, self.rank[neighbours], np.int32(-1))
 
     def climbs(self, parent: IntArray) -> int:
         """The largest number of steps to a farther state (by rank) on any path along a tree to the goal.
@@ -65,8 +62,8 @@ class Ordering:
         down = steps_by_target(self.neighbours, ~above & (self.neighbours >= 0))
         lower = _Pattern.with_diagonal(*down)
         starts = np.concatenate([[0], np.cumsum(above.sum(axis=1))]).astype(np.int32)
-        up = np.flatnonzero(above)
-        return lower, _Pattern(starts, self.neighbours.ravel()[up].astype(np.int32), np.arange(len(up)), up)
+        up = np.flatnonzero(above).astype(np.int32)
+        return lower, _Pattern(starts, self.neighbours.ravel()[up], up)
 
     def split(self, weight: FloatArray) -> tuple[Any, Any]:
         """A matrix M >= 0 of steps as I - L, triangular, and the rest U, with M = L + U.
@@ -94,22 +91,22 @@ class Ordering:
 class _Pattern:
     """Pattern of a compressed sparse matrix whose entries are some of the steps."""
 
-    starts: NDArray[np.int32]
-    indices: NDArray[np.int32]
-    #: Positions of the entries that are steps, and the flat index of each of these steps in (n, 8) arrays.
-    places: IntArray
-    taken: IntArray
+    starts: IndexArray
+    indices: IndexArray
+    #: The flat index in (n, 8) arrays of each step that is an entry, and the positions of these entries; None for all.
+    taken: IndexArray
+    places: IndexArray | None = None
 
     @staticmethod
-    def with_diagonal(taken: IntArray, rows: NDArray[np.int32], starts: NDArray[np.int32]) -> "_Pattern":
+    def with_diagonal(taken: IndexArray, rows: IndexArray, starts: IndexArray) -> "_Pattern":
         """Of steps by column, as :func:`navirl_cli.irl.graph.steps_by_target` gives them.
 
         A diagonal entry precedes the steps. SuperLU takes integers of 32 bits.
         """
         size = len(starts) - 1
-        places = np.arange(len(rows)) + np.repeat(np.arange(1, size + 1), np.diff(starts))
+        places = (np.arange(len(rows)) + np.repeat(np.arange(1, size + 1), np.diff(starts))).astype(np.int32)
         diagonal = (starts + np.arange(size + 1)).astype(np.int32)
         full = np.empty(diagonal[-1], dtype=np.int32)
         full[places] = rows
         full[diagonal[:-1]] = np.arange(size)
-        return _Pattern(diagonal, full, places, taken)
+        return _Pattern(diagonal, full, taken, places)

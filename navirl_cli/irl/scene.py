@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,10 @@ class Scene:
             raise SceneError(
                 f"start and goal lie in the same cell at x {x:.2f} m, y {y:.2f} m: there is nothing to plan"
             )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross process borders without what is computed from it."""
+        return Scene, (self.lattice, self.start, self.goal, self.people_m)
 
     @staticmethod
     def on(
@@ -78,7 +83,7 @@ class Scene:
         graph = TurnGraph.of(self.lattice, self.goal)
         cells = self.ordering
         return Ordering(
-            graph, graph.beginning_in(self.goal), cells.distance[graph.cell], np.full(graph.size, cells.step[0])
+            graph, graph.beginning_in(self.goal), cells.distance[graph.cell], np.broadcast_to(cells.step[0], graph.size)
         )
 
     @cached_property
@@ -170,27 +175,33 @@ def avoidance_line_m(scene: Scene, clearance_m: float) -> FloatArray:
     return line
 
 
-def scenes_of(demonstrations: Iterable[Demonstration]) -> list[Scene]:
+def scenes_of(demonstrations: Iterable[Demonstration], known: Iterable[Scene] = ()) -> list[Scene]:
     """The scene of every demonstration; equal scenes are one object.
 
     The goal of a scene is the cell in which the trial ended, as in the study: a demonstration is a path into its
     absorbing goal.
 
+    Args:
+        demonstrations: The demonstrations.
+        known: Scenes to take where they are equal, with all that they keep.
+
     Raises:
         SceneError: As in :meth:`Scene.on`, naming the demonstration.
     """
+    found = {scene.key: scene for scene in known}
     lattices: dict[str, list[Lattice]] = {}
-    known: dict[tuple[object, ...], Scene] = {}
+    for lattice in dict.fromkeys(scene.lattice for scene in found.values()):
+        lattices.setdefault(lattice.grid.digest, []).append(lattice)
     scenes = []
     for demonstration in demonstrations:
         first, last = demonstration.cells[0], demonstration.cells[-1]
         built = lattices.setdefault(demonstration.grid.digest, [])
-        lattice = next((one for one in built if one.states_of(first[None])[0] >= 0), None)
+        around = next((one for one in built if one.states_of(first[None])[0] >= 0), None)
         try:
-            scene = Scene.on(demonstration.grid, first, last, demonstration.people_m, lattice)
+            scene = Scene.on(demonstration.grid, first, last, demonstration.people_m, around)
         except SceneError as error:
             raise SceneError(f"demonstration {demonstration.id}: {error}") from error
-        if lattice is None:
+        if around is None:
             built.append(scene.lattice)
-        scenes.append(known.setdefault(scene.key, scene))
+        scenes.append(found.setdefault(scene.key, scene))
     return scenes

@@ -1,6 +1,6 @@
 """Which demonstrations and which of their steps a reward is learnt from."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -11,6 +11,7 @@ from navirl_cli.demos.subset import Subset
 from navirl_cli.demos.timing import steps_in_contact
 from navirl_cli.errors import DemonstrationError, unknown
 from navirl_cli.irl.evidence import Evidence, evidence_of
+from navirl_cli.irl.scene import Scene
 
 
 class Steps(StrEnum):
@@ -86,8 +87,14 @@ def of_participant(demonstrations: Sequence[Demonstration], person: str | None) 
     return own
 
 
-def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None) -> Selection:
-    """Demonstrations with those of their steps that count; arguments, result and errors as of :func:`select`."""
+def with_steps(
+    chosen: Sequence[Demonstration], steps: Steps, reach_m: float | None = None, known: Collection[Scene] = ()
+) -> Selection:
+    """Demonstrations with those of their steps that count.
+
+    Arguments, result and errors are those of :func:`select`, and ``known`` is that of
+    :func:`navirl_cli.irl.scene.scenes_of`.
+    """
     masks, reach = None, None
     if chosen and steps is Steps.CONTACT:
         chosen, masks = _with_some(chosen, [steps_in_contact(one) for one in chosen], "contact", "a contact")
@@ -95,7 +102,7 @@ def with_steps(chosen: Sequence[Demonstration], steps: Steps, reach_m: float | N
         reach = required_reach(chosen, reach_m)
         within = [steps_within_reach(one, reach.reach_m if reach else 0.0) for one in chosen]
         chosen, masks = _with_some(chosen, within, "reachable", "a contact or comes within reach of a person")
-    evidence = evidence_of(chosen)
+    evidence = evidence_of(chosen, known)
     return Selection(
         tuple(chosen), evidence if masks is None else evidence.only(masks), common_resolution_m(chosen), reach
     )

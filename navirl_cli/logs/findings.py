@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 
+from navirl_cli.errors import Number
+
 
 class Severity(StrEnum):
     """What a finding means for the user."""
@@ -41,10 +43,20 @@ class Kind(Enum):
         ),
     )
     NO_STAMPS = (_NOTE, "no message on {about} has a stamp; times of receipt are used")
-    UNSTAMPED = (_NOTE, "{count} messages on {about} are stamped 0; their times of receipt are used")
+    UNSTAMPED = (
+        _NOTE,
+        (
+            "{count} message{count:|s} on {about} {count:is|are} stamped 0; {count:its time|their times} of receipt "
+            "{count:is|are} used"
+        ),
+    )
     WILD_STAMPS = (
         _NOTE,
-        "{count} messages on {about} have stamps more than {size:g} s off their clock; their times of receipt are used",
+        (
+            "{count} message{count:|s} on {about} {count:has a stamp|have stamps} more than {size:g} s off "
+            "{count:its|their} clock; "
+            "{count:its time|their times} of receipt {count:is|are} used"
+        ),
     )
     CLOCK_STEP = (
         _NOTE,
@@ -53,8 +65,8 @@ class Kind(Enum):
     CLOCK_STEPS = (
         _NOTE,
         (
-            "{about} jumps {count} times, by up to {size:+.2f} s, first {at_s:.1f} s after the start; later times were "
-            "shifted to continue"
+            "{about} jumps {count} time{count:|s}, by up to {size:+.2f} s, first {at_s:.1f} s after the start; "
+            "later times were shifted to continue"
         ),
     )
     LATER_RECEIPTS = (
@@ -70,14 +82,17 @@ class Kind(Enum):
     )
     PAUSES = (
         _INFO,
-        "{about} pause {count} times while the robot stands still, by up to {size:.2f} s, first at {at_s:.1f} s",
+        (
+            "{about} pause {count} time{count:|s} while the robot stands still, by up to {size:.2f} s, "
+            "first at {at_s:.1f} s"
+        ),
     )
     NO_RECEIPTS = (_NOTE, "{about} gives no usable times of receipt; stamps and the order in the file are used")
     WRONG_RECEIPTS = (
         _NOTE,
         (
-            "{about} gives {count} times of receipt that cannot be true, such as {detail}; stamps and the order in the "
-            "file are used in their place"
+            "{about} gives {count} time{count:|s} of receipt that cannot be true, such as {detail}; stamps and the "
+            "order in the file are used in {count:its|their} place"
         ),
     )
     STAMPED_AHEAD = (
@@ -98,8 +113,11 @@ class Kind(Enum):
             "{change:+.2f} s until the end; aligned"
         ),
     )
-    OUT_OF_ORDER = (_NOTE, "{count} messages on {about} were received out of order; sorted by time")
-    REPEATED = (_NOTE, "{count} messages on {about} repeat the time of another; the first counts")
+    OUT_OF_ORDER = (
+        _NOTE,
+        "{count} message{count:|s} on {about} {count:was|were} received out of order; sorted by time",
+    )
+    REPEATED = (_NOTE, "{count} message{count:|s} on {about} repeat{count:s|} the time of another; the first counts")
     # space
     IGNORED_TRANSFORMS = (_NOTE, "transforms {about}: {detail}; ignored")
     RESCALED = (_NOTE, "{about}: {detail}")
@@ -108,8 +126,11 @@ class Kind(Enum):
         "the static transform {about} is sent again with another value: {detail}; each counts from when it was sent",
     )
     SEVERAL_PARENTS = (_NOTE, "tf gives {about!r} several parents in turn: {detail}")
-    UNCOVERED_POSES = (_NOTE, "{count} poses lie outside the time that tf covers; left out")
-    POSES_IN_GAPS = (_LOSS, "{count} poses lie in gaps of tf longer than {size:g} s; left out")
+    UNCOVERED_POSES = (_NOTE, "{count} pose{count:|s} {count:lies|lie} outside the time that tf covers; left out")
+    POSES_IN_GAPS = (
+        _LOSS,
+        "{count} pose{count:|s} {count:lies|lie} in {count:a gap|gaps} of tf longer than {size:g} s; left out",
+    )
     POSES_BEGIN_LATE = (_INFO, "poses begin {size:.1f} s after the other measurements; a trial from before is cut off")
     POSES_END_EARLY = (
         _INFO,
@@ -128,19 +149,40 @@ class Kind(Enum):
         _NOTE,
         "the wrench's frame {about!r} moves on {detail!r}; the handle's weight may not cancel out",
     )
-    UNUSABLE_MAPS = (_LOSS, "{count} maps on {about} cannot be used ({detail}); left out")
-    EMPTY_ORIGIN = (_NOTE, "{count} maps on {about} have an origin with a quaternion of zeros; taken as not rotated")
-    OUTSIDE_UPDATES = (_LOSS, "{count} updates on {about} do not lie within the map before them; left out")
+    UNUSABLE_MAPS = (_LOSS, "{count} map{count:|s} on {about} cannot be used ({detail}); left out")
+    EMPTY_ORIGIN = (
+        _NOTE,
+        "{count} map{count:|s} on {about} {count:has|have} an origin with a quaternion of zeros; taken as not rotated",
+    )
+    OUTSIDE_UPDATES = (
+        _LOSS,
+        "{count} update{count:|s} on {about} {count:does|do} not lie within the map before {count:it|them}; left out",
+    )
     MAP_CHANGES = (_NOTE, "{about} changes: {detail}; each trial has the map in force at its end")
     # measurements
-    IMPLAUSIBLE = (_LOSS, "{count} messages on {about} hold implausible values ({detail}); left out")
-    OTHER_FRAME = (_LOSS, "{count} messages on {about} are not in frame {detail!r}, as the others are; left out")
-    UNPLACED_MESSAGES = (_LOSS, "{count} messages on {about} left out: {detail}")
-    NOT_PEOPLE = (_NOTE, "{count} entries of {about} are not people and are ignored: {detail}")
-    NO_LABELS = (_NOTE, "no entry of {about} has a class; all {count} count as people")
+    IMPLAUSIBLE = (
+        _LOSS,
+        "{count} message{count:|s} on {about} {count:holds|hold} implausible values ({detail}); left out",
+    )
+    OTHER_FRAME = (
+        _LOSS,
+        "{count} message{count:|s} on {about} {count:is|are} not in frame {detail!r}, as the others are; left out",
+    )
+    UNPLACED_MESSAGES = (_LOSS, "{count} message{count:|s} on {about} left out: {detail}")
+    NOT_PEOPLE = (
+        _NOTE,
+        (
+            "{count} {count:entry|entries} of {about} {count:is|are} not {count:a person|people} and "
+            "{count:is|are} ignored: {detail}"
+        ),
+    )
+    NO_LABELS = (_NOTE, "no entry of {about} has a class; {count:the only one counts as a person|all count as people}")
     GOALS_NOT_REACHED = (
         _LOSS,
-        "{count} goals of {about} were not reached, and the action does not say where they are; left out",
+        (
+            "{count} goal{count:|s} of {about} {count:was|were} not reached, and the action does not say "
+            "where {count:it is|they are}; left out"
+        ),
     )
     GOALS_BY_ACTION = (
         _NOTE,
@@ -153,7 +195,7 @@ class Kind(Enum):
             "robot's plane, and the other axes suffice"
         ),
     )
-    UNPLACED_ENTRIES = (_LOSS, "{count} places on {about} left out: {detail}")
+    UNPLACED_ENTRIES = (_LOSS, "{count} place{count:|s} on {about} left out: {detail}")
 
     def __init__(self, severity: Severity, sentence: str) -> None:
         self.severity = severity
@@ -181,7 +223,7 @@ class Finding:
     def __str__(self) -> str:
         return self.kind.sentence.format(
             about=self.about,
-            count=self.count,
+            count=Number(self.count),
             size=self.size,
             at_s=self.at_s,
             change=self.change,

@@ -15,7 +15,7 @@ and ``inspect`` shows all (:mod:`~navirl_cli.logs.overview`): both follow the sa
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
@@ -181,23 +181,28 @@ def follow(
     findings = (
         *(Finding(Kind.OTHER_ROBOT, name) for name in foreign),
         *shared_topics(topics, chosen),
-        *(timed.findings if timed else ()),
-        *(placed.findings if placed else ()),
-        *(_missing_poses(timed.tables, placed) if timed and placed else ()),
+        *_found(timed, placed),
     )
     damage = source.damage if nothing else (*source.damage, *read.damage)
     lost = (*map(str, damage), *texts(log, findings, Severity.LOSS))
     if lost and options.strict:
         refusals.append(LogError(f"{log}: damaged, which `strict` refuses: {'; '.join(lost)}"))
-    recording = None
+    line = Line(choices, timed, placed, findings, lost, None, tuple(refusals))
     try:
         session = session_of(log, contents)
-        if timed and placed and not refusals:
-            notes = (*source.notes, *texts(log, findings, Severity.NOTE))
-            recording = _recording(log, timed.tables, placed, session, lost, notes)
+        notes = (*source.notes, *texts(log, findings, Severity.NOTE))
+        return replace(line, recording=None if refusals else _recording(log, timed, placed, session, lost, notes))
     except NavirlError as error:
-        refusals.append(error)
-    return Line(choices, timed, placed, findings, lost, recording, tuple(refusals))
+        return replace(line, refusals=(*refusals, error))
+
+
+def _found(timed: Timed | None, placed: Placed | None) -> Findings:
+    """The findings of the stages of time and of space."""
+    return (
+        *(timed.findings if timed else ()),
+        *(placed.findings if placed else ()),
+        *(_missing_poses(timed.tables, placed) if timed and placed else ()),
+    )
 
 
 def _missing_poses(tables: Tables, placed: Placed) -> Findings:
@@ -232,11 +237,17 @@ def _wanted(choices: Mapping[str, Choice], options: LoadOptions) -> dict[str, Ch
 
 
 def _recording(
-    log: str, tables: Tables, placed: Placed, session: Session, damage: tuple[str, ...], notes: tuple[str, ...]
+    log: str,
+    timed: Timed | None,
+    placed: Placed | None,
+    session: Session,
+    damage: tuple[str, ...],
+    notes: tuple[str, ...],
 ) -> Recording:
     """Everything of a log that no stage refused."""
-    if placed.poses is None or placed.occupancy is None:
+    if timed is None or placed is None or placed.poses is None or placed.occupancy is None:
         raise LogError(f"{log}: expected poses and a map, found none")
+    tables = timed.tables
     command_t_ns, command = commands_of(tables.get("joystick", ()))
     return Recording(
         log=log,

@@ -1,6 +1,7 @@
 """What is in a recording, and whether extract can use it: the same line of stages as extract's, and tables of topics.
 
-The tables come from indexes, and from the first messages where indexes do not suffice.
+The tables come from indexes, and from the first messages where indexes do not suffice. Of a large log in a store only
+the summary is read, which takes a few requests, unless all of it is asked for.
 """
 
 from collections import Counter
@@ -20,13 +21,14 @@ from navirl_cli.logs.container.raw import RawFile
 from navirl_cli.logs.findings import Severity
 from navirl_cli.logs.load import Line, LoadOptions, follow
 from navirl_cli.logs.messages.decode import DecodedBatch, Decoder
-from navirl_cli.logs.messages.reader import Contents, Progress, message_times
+from navirl_cli.logs.messages.definitions import parse_definition
+from navirl_cli.logs.messages.reader import Contents, Progress, message_times, scan
 from navirl_cli.logs.messages.reader import check as check_messages
-from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.schema import Schema, SchemaError, full_name
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.clocks import NS_PER_S, Stamped
 from navirl_cli.logs.roles.receipts import wrong_receipts
-from navirl_cli.logs.roles.topics import Choice, Topic, is_missing, topics_of
+from navirl_cli.logs.roles.topics import Choice, Topic, choose, is_missing, topics_of
 from navirl_cli.logs.sources import Source
 
 #: A topic with messages at least this often is regular, s. It has a gap where it pauses this many times longer than
@@ -36,6 +38,8 @@ _REGULAR_S, _PAUSE, _GAP_S = 1.0, 5.0, 0.5
 _CLOCKS: Final = ("odometry", "wrench", "tf")
 #: Chunks in whose messages stamps are looked for.
 _SAMPLED: Final = 8
+#: A log in a store whose times of receipt take more requests than this is told by its summary alone.
+_REQUESTS: Final = 8
 _STAMP: Final = "header.stamp"
 _TF_STAMP: Final = message_types.TF.fields[_STAMP]
 #: A topic and the full name of one of its types.
@@ -55,8 +59,9 @@ class Flow:
     end_ns: int | None
     #: Messages a second on average, without gaps; None for less than three messages.
     rate_hz: float | None
-    #: Gaps of a regular topic: how many, the longest in s, and when that begins, s after the log's first message.
-    gaps: int
+    #: Gaps of a regular topic: how many, None where that is not known; the longest in s, and when that begins, s after
+    #: the log's first message.
+    gaps: int | None
     longest_s: float
     longest_at_s: float
     #: Stamps - times of receipt, s, in the first messages; None without stamps.
@@ -77,6 +82,8 @@ class Overview:
     line: Line
     #: What is lost, in words.
     damage: tuple[str, ...]
+    #: Whether only the summary was read.
+    is_brief: bool = False
 
     @property
     def choices(self) -> Mapping[str, Choice]:
@@ -145,6 +152,8 @@ def overview(
     """
     with ExitStack() as stack:
         files = [stack.enter_context(open_log(path)) for path in source.files]
+        if not check and any(map(_is_far, files)):
+            return _brief(source, [scan(file) for file in files], requested, namespace)
         timed = [message_times(file) for file in files]
         contents = tuple(one for one, _ in timed)
         line = follow(
@@ -162,6 +171,36 @@ def overview(
         _flows(contents, received, start_ns or 0, stamped),
         line,
         tuple(dict.fromkeys((*map(str, (*source.damage, *damage)), *line.lost))),
+    )
+
+
+def _is_far(file: RawFile) -> bool:
+    """Whether times of receipt alone would take many requests to a store."""
+    with LogFile(file) as log:
+        return log.requests_of_times > _REQUESTS
+
+
+def _brief(
+    source: Source, contents: Sequence[Contents], requested: Mapping[str, Sequence[str]], namespace: str | None
+) -> Overview:
+    """What the summaries of a recording in a store state; arguments as of :func:`overview`."""
+    topics = topics_of(contents)
+    choices = choose(source.name, topics, requested, namespace)
+    damage = (*map(str, source.damage), *(str(note) for one in contents for note in one.damage))
+    encodings = {_key(channel): channel.message_encoding for one in contents for channel in one.channels}
+    flows = [
+        Flow(topic, encodings[topic.name, topic.type_name], None, None, None, None, 0.0, 0.0, None) for topic in topics
+    ]
+    starts, ends = ([getattr(one, end) for one in contents] for end in ("start_ns", "end_ns"))
+    return Overview(
+        source,
+        tuple(contents),
+        min((one for one in starts if one is not None), default=None),
+        max((one for one in ends if one is not None), default=None),
+        tuple(flows),
+        Line(choices, None, None, (), damage, None, ()),
+        tuple(dict.fromkeys(damage)),
+        is_brief=True,
     )
 
 

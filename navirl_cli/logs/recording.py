@@ -137,7 +137,7 @@ class Recording:
     unplaced_ns: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     #: First and last time of anything that was measured, ns; None: those of the poses.
     measured_ns: tuple[int, int] | None = None
-    #: Why there is no goal where there is none, as far as it is known: "1 messages on /goal_pose left out: ...".
+    #: Why there is no goal where there is none, as far as it is known: "1 message on /goal_pose left out: ...".
     no_goal: str = ""
     #: What could not be read, in words.
     damage: tuple[str, ...] = field(default=())

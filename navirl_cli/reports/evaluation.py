@@ -12,7 +12,8 @@ from navirl_cli.artefacts.store import write_json
 from navirl_cli.documents.tables import ENDINGS, Cell, Column, Format, Interval, Spread, Table, written
 from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics, quantiles_of
-from navirl_cli.evaluation.metrics import METRICS, Metric
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import METRICS
 from navirl_cli.evaluation.paired import FEWEST, Paired
 from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.files import replacing

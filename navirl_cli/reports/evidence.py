@@ -7,6 +7,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.reach import reach_unknown
 from navirl_cli.demos.starts import starts_aside_m
 from navirl_cli.documents.document import Block, Paragraph
+from navirl_cli.errors import Number, counted
 
 #: Difference of least distances beyond which the reach of people matters, m.
 REACH_MATTERS_M = 0.05
@@ -88,13 +89,20 @@ def evidence_remarks(chosen: Sequence[Demonstration], everyone: Sequence[Demonst
     blind = reach_unknown([one for one in chosen if len(one.people_m)])
     if blind:
         lines.append(
-            f"{len(blind)} of {len(chosen)} demonstrations have no wrench: where people pushed by hand, the learnt "
+            f"{len(blind)} of {counted(len(chosen), 'demonstration')} {Number(len(blind)):has|have} no "
+            "wrench: where people pushed by hand, the learnt "
             "distances may be too small, because paths out of reach count as accepted"
         )
     aside = starts_aside_m(chosen, everyone)
     if aside is not None:
+        number = len(chosen)
+        who = (
+            "the only demonstration is of cycle 1 and starts"
+            if number == 1
+            else (f"all {number} demonstrations are of cycle 1 and start")
+        )
         lines.append(
-            f"all {len(chosen)} demonstrations are of cycle 1 and start {aside:.2f} m or more aside of where the robot "
-            "starts otherwise: from there the learnt policy may pass people much too close; learn from cycle 2 as well"
+            f"{who} {aside:.2f} m or more aside of where the robot starts otherwise: "
+            "from there the learnt policy may pass people much too close; learn from cycle 2 as well"
         )
     return lines

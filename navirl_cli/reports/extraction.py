@@ -96,6 +96,6 @@ def published_notes(results: Iterable[Extraction]) -> list[str]:
         different = [name for name, same in result.published.items() if not same]
         if result.published:
             listed = f"; different: {', '.join(different)}" if different else ""
-            count = f"{len(result.published) - len(different)} of {len(result.published)} paths"
+            count = f"{len(result.published) - len(different)} of {counted(len(result.published), 'path')}"
             notes.append(f"{result.log}: cells equal to those published with it: {count}{listed}")
     return notes

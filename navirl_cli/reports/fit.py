@@ -4,13 +4,12 @@ All of it is read from the content of a reward file, so that the page of ``navir
 """
 
 from collections.abc import Mapping, Sequence
-from math import inf, isfinite, isinf, nan
+from math import comb, inf, isfinite, isinf, nan
 from typing import Any
 
 import numpy as np
 
-from navirl_cli.artefacts.rewards import LearntReward, terms_of
-from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.artefacts.rewards import terms_of
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
 from navirl_cli.errors import counted
@@ -19,16 +18,10 @@ from navirl_cli.irl.reward import parameters_of
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
-from navirl_cli.reports.evidence import evidence_remarks, reach_line, reach_warnings
-from navirl_cli.reports.persons import ended, person_blocks, person_warnings
-from navirl_cli.reports.repeated import repeated
+from navirl_cli.reports.evidence import reach_line
+from navirl_cli.reports.fit_remarks import FEW
+from navirl_cli.reports.persons import ended, person_blocks
 
-#: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
-FEW = 10
-#: Correlation beyond which two parameters are to be read together.
-TIED = 0.95
-#: Expected bias, in standard errors, beyond which a correction is recommended, and beyond which it is not valid.
-BIASED, TOO_BIASED = 0.3, 1.0
 _OF = {
     "participant": "from the scatter between participants (Student's quantile, {freedom} degrees of freedom)",
     "model": "from the likelihood",
@@ -137,7 +130,7 @@ def interval_notes(content: Mapping[str, Any]) -> list[Block]:
     else:
         text = f"95 % intervals: {_BY[sets[0]['method']]}, {_OF[sets[0]['errors']].format(freedom=count - 1)}"
     if len(sets) > 1:
-        text += "; as if one person: the same for paths of one policy"
+        text += "; as if one person: the same for paths of one policy, too narrow where people differ"
     rough = approximate(content)
     return [Paragraph(f"{text}.{' ' + rough if rough else ''}")]
 
@@ -145,15 +138,34 @@ def interval_notes(content: Mapping[str, Any]) -> list[Block]:
 def approximate(content: Mapping[str, Any]) -> str:
     """Why the intervals in front are approximate. Empty where simulations found 92 to 98 % of them right."""
     sets = content.get("intervals", [])
-    count = len(content["participants"])
-    if sets and sets[0]["method"] == "posterior":
-        few = f" {count} participants say little about how people differ." if 1 < count < FEW else ""
+    if not sets:
+        return ""
+    return roughness(sets[0]["method"], sets[0]["errors"], len(content["participants"]), len(content["demonstrations"]))
+
+
+def roughness(method: str, errors: str, participants: int, demonstrations: int) -> str:
+    """Why intervals are approximate, in a sentence or two; empty where they are not.
+
+    Args:
+        method: A :class:`~navirl_cli.irl.intervals.Kind`.
+        errors: An :class:`~navirl_cli.irl.intervals.Errors`.
+        participants: Whose demonstrations these are.
+        demonstrations: That the reward was learnt from.
+    """
+    several = 1 < participants < FEW
+    if method == "posterior":
+        few = f" {participants} participants say little about how people differ." if several else ""
         return f"Approximate: in simulations 75 to 90 % of such intervals covered, rather than 95 %.{few}"
-    if sets and sets[0]["errors"] == "participant" and count < FEW:
-        return f"Approximate, too wide rather than too narrow: {count} participants say little about how people differ."
-    if sets and sets[0]["errors"] == "model" and len(content["demonstrations"]) < FEW_DEMONSTRATIONS:
-        people = " If people differ they are too narrow: so few say little about that." if 1 < count < FEW else ""
-        return f"Approximate: with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %.{people}"
+    if errors == "participant" and participants < FEW:
+        return (
+            f"Approximate, too wide rather than too narrow: {participants} participants say little about how people "
+            "differ."
+        )
+    if errors == "model" and (several or demonstrations < FEW_DEMONSTRATIONS):
+        few = "with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %"
+        narrow = f"too narrow if people differ, about which {participants} say little"
+        why = [few] * (demonstrations < FEW_DEMONSTRATIONS) + [narrow] * several
+        return f"Approximate: {'; '.join(why)}."
     return ""
 
 
@@ -233,7 +245,30 @@ def bootstrap_line(content: Mapping[str, Any]) -> list[Block]:
         for one, identified in zip(content["parameters"], found["identified_draws"], strict=True)
         if identified < count
     ]
-    return [Paragraph(", ".join([f"Bootstrap: {count} draws of participants (seed {found['seed']})", *lost]) + ".")]
+    text = ", ".join([f"Bootstrap: {count} draws of {people(content)} (seed {found['seed']})", *lost])
+    return [Paragraph(" ".join([f"{text}.", *_rough_draws(content)]))]
+
+
+def _rough_draws(content: Mapping[str, Any]) -> list[str]:
+    """Why the intervals of a bootstrap are approximate."""
+    number, found = len(content["participants"]), content["bootstrap"]
+    why = []
+    if number < FEW:
+        distinct = comb(2 * number - 1, number)
+        few = f", of whom there are {distinct} different draws" if distinct < len(found["theta"]) else ""
+        why.append(f"Its intervals are approximate, too narrow rather than too wide: {number} people{few}.")
+    fixed = [
+        one["name"]
+        for one, known, draws in zip(
+            content["parameters"], found.get("accelerated", []), found["identified_draws"], strict=False
+        )
+        if draws and not known
+    ]
+    if fixed:
+        why.append(
+            f"No correction for acceleration in {', '.join(fixed)}: a fit without one participant does not identify it."
+        )
+    return why
 
 
 def profile_table(content: Mapping[str, Any]) -> list[Block]:
@@ -328,96 +363,3 @@ def _per_step(log_likelihoods: Sequence[float | None], steps: Sequence[int]) -> 
 def _root_mean_square(values: Sequence[float | None], counted: Sequence[bool]) -> float:
     known = np.array(values, dtype=float)[np.array(counted, dtype=bool)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else nan
-
-
-def cannot_learn(chosen: Sequence[Demonstration]) -> list[str]:
-    """What the demonstrations cannot show, which is known before the fit starts."""
-    if any(len(demonstration.people_m) for demonstration in chosen):
-        return []
-    line = (
-        f"none of the {len(chosen)} demonstrations has people, so that the personal space (a_p, sigma_p) cannot be "
-        "learnt from them; extract them again with a people topic, or give places with `person` x,y"
-    )
-    return [line]
-
-
-def remarks(
-    chosen: Sequence[Demonstration],
-    earlier: LearntReward | None,
-    *,
-    chosen_by: tuple[str, ...],
-    everyone: Sequence[Demonstration] = (),
-) -> list[str]:
-    """Choices that the user may not have intended, what extraction found unusual, and what is not evidence.
-
-    Args:
-        chosen: From which the reward was learnt.
-        earlier: The prior.
-        chosen_by: Conditions that the user named.
-        everyone: Demonstrations of the file.
-    """
-    lines = repeated(chosen)
-    alone = sum(demonstration.corrected is False for demonstration in chosen)
-    if alone and not chosen_by:
-        lines.append(
-            f"{alone} of {len(chosen)} demonstrations show no intervention: the reward also learns what the "
-            "robot does by itself; leave them out with `only_corrected`, or choose with `condition`"
-        )
-    twice = [] if earlier is None else sorted({d.id for d in chosen} & set(earlier.demonstrations))
-    if twice:
-        lines.append(f"the prior was learnt from {', '.join(twice)} too: these demonstrations count twice")
-    return [*lines, *evidence_remarks(chosen, everyone)]
-
-
-def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
-    """What a user should know before trusting the numbers.
-
-    Args:
-        content: Of the reward file.
-        status: Whether a status that asks for something is among it.
-    """
-    parameters = content["parameters"]
-    names = [one["name"] for one in parameters]
-    matrix = correlation(np.array(content["covariance"], dtype=float))
-    lines = [
-        f"{names[i]} and {names[j]} are strongly correlated ({matrix[i, j]:.3f}): the data barely separate them; read "
-        "them together; people at other distances, or more detours, would separate them"
-        for j in range(len(names))
-        for i in range(j)
-        if abs(matrix[i, j]) > TIED
-    ]
-    if not content.get("intervals"):
-        lines += [
-            f"{one['name']} is uncertain: its standard error exceeds half of its value"
-            for one in parameters
-            if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
-        ]
-    lines += _bias_warnings(parameters)
-    lines += reach_warnings(content)
-    lines += person_warnings(content)
-    count = len(content["participants"])
-    if 1 < count < FEW:
-        lines.append(
-            f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
-        )
-    if status and content["status"] != Status.CONVERGED.value:
-        lines.append(f"{content['status']}: {ended(content)}")
-    return lines
-
-
-def _bias_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The parameters that maximum likelihood exaggerates, and what to do."""
-    biased = {
-        one["name"]: one["bias_expected"] / one["standard_error"]
-        for one in parameters
-        if one.get("bias_expected") is not None and one["standard_error"]
-    }
-    large = {name: share for name, share in biased.items() if abs(share) > BIASED}
-    if not large:
-        return []
-    words = " and ".join(f"{name} ({share:+.1f} standard errors)" for name, share in large.items())
-    if max(map(abs, large.values())) > TOO_BIASED:
-        remedy = "too few demonstrations to correct it: read the intervals, not the values"
-    else:
-        remedy = "subtract it with `correct_bias`"
-    return [f"maximum likelihood is expected to be off in {words}; {remedy}"]

@@ -56,6 +56,9 @@ def field_of(summary: Content, content: Content, name: str) -> Any:
     if left is None:
         return deeper
     known = list(found) if isinstance(found, Mapping) else []
+    deep = [f"{key}.{name}" for key, value in summary.items() if isinstance(value, Mapping) and name in value]
+    if deep:
+        raise ArgumentError(f"`field`: expected dots between levels, found {name!r}; did you mean {deep[0]!r}?")
     raise ArgumentError(unknown("`field`", rest if known else name, known or summary))
 
 

@@ -1,17 +1,49 @@
 """How a reward was made: from which demonstrations and with which settings, and the command lines for it."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from navirl_cli.artefacts.options import option_words
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.subset import Subset
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph
+from navirl_cli.errors import counted
+from navirl_cli.files import MANIFEST, Input
 
 #: Defaults of a fit, as its file names them.
 _FIT = {"method": "newton", "l2": 1e-3, "learnt_from": "all", "terms": ["length", "deviation", "personal-space"]}
-#: Options of a fit by the names in its file.
+#: Options of an extraction by the names of its settings.
+SETTINGS = {
+    "split": "split",
+    "resolution_m": "resolution",
+    "robot_radius_m": "robot_radius",
+    "rasterizer": "rasterizer",
+    "begins_n": "contact_force",
+    "cutoff_hz": "wrench_filter",
+    "people_m": "person",
+    "goal_m": "goal",
+    **{
+        name: name
+        for name in ("participant", "condition", "cycle", "set", "gain", "keep_truncated", "namespace", "time", "frame")
+    },
+    **{name: name for name in ("wrench_frame", "force_scale", "map", "trials", "strict", "join")},
+    "topics": "topic",
+}
+
+
+def _point(xy_m: Sequence[float]) -> str:
+    """A point as an option takes it."""
+    return ",".join(f"{axis:.15g}" for axis in xy_m)
+
+
+_FORMS: Mapping[str, Callable[[Any], Any]] = {
+    "person": lambda people: [_point(one) for one in people],
+    "goal": _point,
+    "topic": lambda topics: [f"{role}={name}" for role, names in topics.items() for name in names],
+}
+#: Options of a fit by the names in its file, for files that do not hold its options.
 _OPTIONS = {"method": "--method", "l2": "--l2", "learnt_from": "--steps", "terms": "--terms"}
 
 
@@ -19,17 +51,35 @@ _OPTIONS = {"method": "--method", "l2": "--l2", "learnt_from": "--steps", "terms
 class Made:
     """The files of a report and how it was asked for."""
 
-    #: Names of the files of demonstrations and of the reward.
-    demos: str
-    reward: str
-    #: Names of the logs, and the settings of extraction that are no defaults, by name.
-    logs: tuple[str, ...]
+    #: Of the demonstrations and of the reward.
+    demos: tuple[Input, ...]
+    reward: Input
+    #: Files that the demonstrations were extracted from.
+    inputs: Sequence[Input]
+    #: Settings of the extraction, and those of one without options.
     settings: Mapping[str, Any]
+    usual: Mapping[str, Any]
     #: Options of the report.
     options: tuple[str, ...]
     seed: int
     #: All demonstrations of the file.
     everyone: Sequence[Demonstration]
+
+    @property
+    def files(self) -> list[Input]:
+        """All files with their hashes."""
+        return [*self.inputs, *self.demos, self.reward]
+
+    @property
+    def logs(self) -> list[str]:
+        """Names of the logs among the inputs, which also hold a map and a table of labels."""
+        others = {self.settings.get("map"), self.settings.get("trials")}
+        return [one.file for one in self.inputs if one.file not in others]
+
+    @property
+    def names(self) -> list[str]:
+        """Of the demonstrations for command lines: a folder has a / at its end."""
+        return [one.file.removesuffix(MANIFEST) for one in self.demos]
 
 
 def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
@@ -44,11 +94,12 @@ def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
     start = ", ".join(f"{name} {value:g}" for name, value in content["initial"].items())
     how = f"Steps: {content['learnt_from']} ({content['steps']}); method {content['method']}"
     lines = [
-        f"Learnt from {len(used)} of {len(demonstrations)} demonstrations: {', '.join(used)}",
+        f"Learnt from {len(used)} of {counted(len(demonstrations), 'demonstration')}: {', '.join(used)}",
         f"{how}; regulariser {content['l2']:g}; {'with' if content['prior'] else 'without'} a prior; start: {start}",
     ]
-    if made.settings:
-        changed = ", ".join(f"{name} {value}" for name, value in made.settings.items())
+    settings = changed_settings(made.settings, made.usual)
+    if settings:
+        changed = ", ".join(f"{name} {value}" for name, value in settings.items())
         lines.append(f"Settings of the extraction other than the defaults: {changed}")
     commands = _commands(taught, content, made)
     return [
@@ -66,29 +117,49 @@ def changed_settings(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -
         if isinstance(value, Mapping):
             own = defaults.get(name)
             found |= changed_settings(value, own if isinstance(own, Mapping) else {})
-        elif value not in (defaults.get(name), None, [], False) and not (name in _USUAL and value == _USUAL[name]):
+        elif value != defaults[name] if name in defaults else value:
             found[name] = value
     return found
 
 
-#: Settings that extract adds to its own, with their usual values.
-_USUAL = {"time": "header", "force_scale": 1.0, "wrench": True}
-
-
 def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
-    """Command lines; none for a fit with a prior, whose file is not known."""
-    extract = shlex.join(["navirl", "extract", *made.logs, "-o", made.demos])
-    report = shlex.join(["navirl", "report", made.demos, made.reward, *made.options, "-o", "report.html"])
-    if content["prior"] or not taught:
-        return [extract, report]
+    """Command lines; none for a fit with a prior of a file without options, which does not name it."""
+    demos, reward = made.names, made.reward.file
+    lines = [["report", *demos, reward, *made.options, "-o", "report.html"]]
+    options = content.get("options")
+    if options is not None or (taught and not content["prior"]):
+        words = _fit_words(taught, content, made) if options is None else options
+        lines.insert(0, ["fit", *demos, *words, "-o", reward])
+    if len(demos) == 1:  # which log is in which of several files is not known
+        lines.insert(0, ["extract", *made.logs, *extract_words(made.settings, made.usual), "-o", *demos])
+    return [shlex.join(["navirl", *line]) for line in lines]
+
+
+def _fit_words(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
+    """Options of a fit whose file does not hold them, as far as they show in the result."""
     changed = [
         word
         for name, option in _OPTIONS.items()
         if content.get(name, _FIT[name]) != _FIT[name]
         for word in (option, ",".join(content[name]) if name == "terms" else f"{content[name]}")
     ]
-    chosen = selection_words(made.everyone, taught)
-    return [extract, shlex.join(["navirl", "fit", made.demos, *chosen, *changed, "-o", made.reward]), report]
+    return [*selection_words(made.everyone, taught), *changed]
+
+
+def extract_words(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -> list[str]:
+    """The settings of an extraction that are no defaults, as options of the command line.
+
+    Args:
+        settings: As in a demonstrations file; older files lack some.
+        defaults: As in a demonstrations file that is extracted without options.
+    """
+    flat, usual = {**settings, **settings.get("push", {})}, {**defaults, **defaults["push"]}
+    given = {option: flat.get(name, usual[name]) for name, option in SETTINGS.items()}
+    given["no_wrench"] = not flat.get("wrench", True)
+    for option, form in _FORMS.items():
+        if given[option]:
+            given[option] = form(given[option])
+    return option_words(given, {option: usual[name] for name, option in SETTINGS.items()})
 
 
 def selection_words(everyone: Sequence[Demonstration], taught: Sequence[Demonstration]) -> list[str]:

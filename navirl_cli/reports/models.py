@@ -5,6 +5,7 @@ from typing import Any
 
 from navirl_cli.documents.document import Block, Bullets, Paragraph
 from navirl_cli.documents.tables import Column, Spread, Table
+from navirl_cli.errors import counted
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.models import Model, Models
 from navirl_cli.irl.terms import TERMS
@@ -16,7 +17,7 @@ FEW = 10
 def models_report(found: Models) -> list[Block]:
     """The models, their formulas, and the problems of their fits."""
     return [
-        Paragraph(f"{len(found.participants)} participants, {int(found.steps.sum())} steps."),
+        Paragraph(f"{counted(len(found.participants), 'participant')}, {counted(int(found.steps.sum()), 'step')}."),
         models_table(found),
         Paragraph(_OPTIMISM),
         *_problems(found),

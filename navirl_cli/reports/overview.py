@@ -22,6 +22,10 @@ _FLOW = (
     Column("longest_gap_at_s", "at s", decimals=1),
     Column("stamp_lead_s", "stamp lead s", decimals=3, sign=True),
 )
+_BRIEF = (
+    "only the summary was read, in a few requests to the store: rates, gaps, clocks, frames, damage in chunks, and "
+    "whether extract refuses the log, are not known; `check` reads all of it"
+)
 _ROLE = (Column("role"), Column("topic"), Column("reason"))
 
 
@@ -81,8 +85,11 @@ def _verdict(view: Overview, outcome: _Outcome) -> list[Block]:
         verdict = f"extract needs: {', '.join(view.needed)}"
     else:
         verdict = "extract has what it needs" if outcome.demonstrations else "extract refuses this log"
+    if view.is_brief and not view.needed:
+        verdict = "extract has the topics that it needs"
     count = outcome.demonstrations
-    found = [f"{count} trial{'s' if count > 1 else ''}, each a demonstration"] if count else []
+    found = [_BRIEF] if view.is_brief else []
+    found += [f"{counted(count, 'trial')}, each a demonstration"] if count else []
     return [Heading(verdict), Bullets((*found, *outcome.reasons, *(missing[name] for name in order)))]
 
 
@@ -141,7 +148,8 @@ def overview_document(view: Overview) -> dict[str, Any]:
         "frames": view.frames or None,
         "needed": list(view.needed),
         "refusals": [] if view.needed or outcome.demonstrations else list(outcome.reasons),
-        "demonstrations": outcome.demonstrations,
+        "demonstrations": None if view.is_brief else outcome.demonstrations,
+        "summary_only": view.is_brief,
         "left_out": list(outcome.reasons) if outcome.demonstrations else [],
         "notes": list(view.source.notes),
         "damage": list(view.damage),

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from navirl_cli.documents.tables import Column, Table
+from navirl_cli.errors import counted
 from navirl_cli.evaluation.ranks import EXTREME, RARE, Rank, Ranking, by_group_and_training
 
 _DECIMALS = 3
@@ -85,7 +86,9 @@ def rank_lines(ranked: Ranking) -> list[str]:
         # every demonstration has one lower end by log-likelihood, and two ends by distance and by area
         like = [one for one in ranks if one.group not in unlike]
         chance = sum(RARE + 2 * EXTREME * (1 + (one.distance_rank is not None)) for one in like)
-        lines.append(f"of {len(like)} demonstrations at most {chance:.1f} would fit as badly by chance")
+        lines.append(
+            f"by chance alone, at most {chance:.2g} of {counted(len(like), 'demonstration')} would fit as badly"
+        )
     if unlike:
         lines.append(f"the reward was not learnt from {' / '.join(unlike)}: ranks there do not show how well it fits")
     if ranks and ranked.trained is None:

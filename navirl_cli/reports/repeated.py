@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 
 from navirl_cli.demos.demonstration import Demonstration
+from navirl_cli.errors import counted
 
 #: Numbers, which differ between texts that say the same.
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -27,7 +28,7 @@ def _line(entries: Sequence[tuple[str, str]], count: int) -> str:
     """One line for all demonstrations about which the same is said."""
     names = list(dict.fromkeys(name for name, _ in entries))
     texts = list(dict.fromkeys(text for _, text in entries))
-    listed = ", ".join(names) if len(names) <= _NAMED else f"{len(names)} of {count} demonstrations"
+    listed = ", ".join(names) if len(names) <= _NAMED else f"{len(names)} of {counted(count, 'demonstration')}"
     if len(texts) == 1:
         return f"{listed}: {texts[0]}"
     return f"{listed}: {texts[0]}" + (f" ({names[0]}; with other numbers the others)" if len(names) > 1 else "")

@@ -10,7 +10,8 @@ import numpy as np
 from navirl_cli import __version__
 from navirl_cli.artefacts.rewards import LearntReward
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Report
+from navirl_cli.documents.numbers import evenly
 from navirl_cli.documents.tables import Column, Table
 from navirl_cli.errors import counted
 from navirl_cli.evaluation.compare import Comparison
@@ -24,7 +25,6 @@ from navirl_cli.reports.evidence import reach_line
 from navirl_cli.reports.extraction import trial_table
 from navirl_cli.reports.fit import (
     bootstrap_line,
-    cannot_learn,
     correlation_table,
     formula,
     interval_notes,
@@ -33,12 +33,12 @@ from navirl_cli.reports.fit import (
     parameter_table,
     people,
     profile_table,
-    remarks,
     validation_tables,
-    warnings,
 )
+from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 from navirl_cli.reports.made import Made, made_blocks
 from navirl_cli.reports.persons import ended, person_blocks
+from navirl_cli.reports.pictures import pictures
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 from navirl_cli.reports.recommendation import recommendation_blocks
 from navirl_cli.reports.repeated import repeated
@@ -62,7 +62,6 @@ def report_of(
     result: Comparison,
     ranked: Ranking,
     figures: Mapping[str, Path],
-    made_from: Sequence[Mapping[str, str]],
     made: Made,
 ) -> Report:
     """Compose the page.
@@ -74,7 +73,6 @@ def report_of(
         result: Metrics.
         ranked: Ranks of the demonstrations among the policy's paths.
         figures: Files by name.
-        made_from: Files and hashes.
         made: How it was made; its seed is that of the intervals.
     """
     notes, seed = repeated(demonstrations), made.seed
@@ -90,16 +88,16 @@ def report_of(
         meanings_of_parameters(content),
         *bootstrap_line(content),
         *profile_table(content),
-        *_pictures(figures, "profile"),
+        *pictures(figures, _CAPTIONS, "profile"),
         *correlation_table(content),
         likelihood_table(content),
         *reach_line(content),
         *_meanings(demonstrations, learnt, seed),
         Heading("Learnt policy"),
-        *_pictures(figures, "policy"),
+        *pictures(figures, _CAPTIONS, "policy"),
         Heading("Path metrics"),
         group_table(result.groups, METRICS, "Mean ± standard deviation."),
-        *_pictures(figures, "properties", "paths"),
+        *pictures(figures, _CAPTIONS, "properties", "paths"),
         Heading("Ranks of the demonstrations"),
         *_rank_blocks(learnt, ranked),
         Heading("Prediction of participants left out"),
@@ -109,7 +107,7 @@ def report_of(
         *([Bullets(tuple(notes))] if notes else []),
         *made_blocks(content, made),
         Heading("Sources"),
-        Table((Column("file"), Column("sha256", "SHA-256")), tuple((one["file"], one["sha256"]) for one in made_from)),
+        Table((Column("file"), Column("sha256", "SHA-256")), tuple((one.file, one.sha256) for one in made.files)),
     ]
     return Report("Learnt navigation reward", tuple(blocks), f"navirl {__version__}")
 
@@ -148,21 +146,26 @@ def _in_metres(demonstrations: Sequence[Demonstration], learnt: LearntReward, se
 
 def _sentence(one: Meaning) -> str:
     """A quantity with its interval."""
-    interval = ""
+    value, interval = evenly([one.value, *_ends(one.lower, one.upper, one.value)])[0], ""
     if isfinite(one.lower) or isfinite(one.upper):
         interval = f" ({in_words(one.lower, one.upper, one.value)})"
-    return f"{one.text} **{one.value:.3g}{' ' + one.unit if one.unit else ''}**{interval}."
+    return f"{one.text} **{value}{' ' + one.unit if one.unit else ''}**{interval}."
 
 
 def in_words(lower: float, upper: float, value: float) -> str:
     """An interval in words; an open end is infinite, and one far below the value is none."""
-    if 0 <= lower < NOTHING * value:
-        lower = -inf
+    lower, upper = _ends(lower, upper, value)
+    _, low, high = evenly([value, lower, upper])
     if not (isfinite(lower) or isfinite(upper)):
         return "the demonstrations set no range"
     if not isfinite(lower):
-        return f"less than {upper:.3g}"
-    return f"{lower:.3g} to {upper:.3g}" if isfinite(upper) else f"more than {lower:.3g}"
+        return f"less than {high}"
+    return f"{low} to {high}" if isfinite(upper) else f"more than {low}"
+
+
+def _ends(lower: float, upper: float, value: float) -> tuple[float, float]:
+    """The ends of an interval; one far below the value is none."""
+    return (-inf if 0 <= lower < NOTHING * value else lower), upper
 
 
 def _rank_blocks(learnt: LearntReward, ranked: Ranking) -> list[Block]:
@@ -191,18 +194,3 @@ def _warnings(
     if bad:
         lines.append(f"The policy rarely takes paths like those of {bad}; see the ranks.")
     return [Heading("Warnings"), Bullets(tuple(lines))] if lines else []
-
-
-def _pictures(figures: Mapping[str, Path], *names: str) -> list[Block]:
-    """The figures of these names, with those for dark and for narrow screens."""
-    return [
-        Picture(
-            figures[name],
-            _CAPTIONS[name],
-            dark=figures.get(f"{name}_dark"),
-            narrow=figures.get(f"{name}_narrow"),
-            narrow_dark=figures.get(f"{name}_narrow_dark"),
-        )
-        for name in names
-        if name in figures
-    ]

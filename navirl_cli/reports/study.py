@@ -3,28 +3,31 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
-
-import numpy as np
 
 from navirl_cli import __version__
-from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Picture, Report
-from navirl_cli.documents.tables import Cell, Column, Interval, Spread, Table
-from navirl_cli.errors import counted
+from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph, Report
+from navirl_cli.errors import Number, counted
 from navirl_cli.evaluation.compare import DRIVEN
-from navirl_cli.evaluation.groups import GroupMetrics, mean_and_spread
-from navirl_cli.evaluation.metrics import PAPER_METRICS
-from navirl_cli.irl.fit import PAPER_L2, Fit
+from navirl_cli.evaluation.groups import GroupMetrics
+from navirl_cli.irl.fit import PAPER_L2
 from navirl_cli.irl.reward import parameters_of
-from navirl_cli.irl.status import Status
-from navirl_cli.reports.evaluation import DECIMALS, group_table
-from navirl_cli.reports.fit import formula, interval_cell
+from navirl_cli.reports.evaluation import group_table
+from navirl_cli.reports.fit import formula
+from navirl_cli.reports.pictures import pictures
+from navirl_cli.reports.study_tables import (
+    answers_table,
+    claims_table,
+    closeness_table,
+    completion_table,
+    intervals_table,
+    is_weak,
+    rewards_table,
+)
 from navirl_cli.study.claims import Claim
-from navirl_cli.study.learning import FIRST, SECOND, CycleFit, Learnt
+from navirl_cli.study.learning import FIRST, SECOND
 from navirl_cli.study.measures import STUDY_METRICS
-from navirl_cli.study.pipeline import PUBLISHED_DEMONSTRATIONS, PUBLISHED_PARTICIPANTS, PUBLISHED_THETA, Study
+from navirl_cli.study.pipeline import PUBLISHED_PARTICIPANTS, Study
 from navirl_cli.study.questionnaire import Answer, Shares
 
 #: Figures that a report can hold: name of the file and caption. The numbers are the paper's.
@@ -80,7 +83,7 @@ class StudyContext:
     notes: Sequence[str]
     #: Published paths, and whether our cells are the same.
     cells: Sequence[tuple[str, bool]]
-    #: Figures drawn, by name.
+    #: Figures drawn, by name; with those for other screens, as :func:`navirl_cli.reports.pictures.pictures` takes them.
     figures: Mapping[str, Path]
     #: Answers to the questionnaire.
     answers: Sequence[Shares]
@@ -103,20 +106,20 @@ def report_of(study: Study, context: StudyContext) -> Report:
         Paragraph(f"{summary} {_INTRODUCTION}"),
         Heading("The paper's claims, tested with these participants"),
         Bullets(tuple(_claims_lines(study.claims))),
-        _claims_table(study.claims),
+        claims_table(study.claims),
         Paragraph(_VERDICTS),
         *_tasks(study, context),
         Heading("Paths"),
-        *_pictures(context, "fig3_paths", "fig5_replays"),
+        *pictures(context.figures, FIGURES, "fig3_paths", "fig5_replays"),
         Heading("Path properties"),
         *_properties(study.groups),
-        *_pictures(context, "fig7_properties"),
+        *pictures(context.figures, FIGURES, "fig7_properties"),
         Heading("Learnt rewards"),
         *_rewards(study),
         Heading("Learnt policies beside the second cycle"),
-        _closeness_table(study),
+        closeness_table(study),
         Paragraph(_ON_GRID),
-        *_pictures(context, "fig8_pooled", "fig9_unseen"),
+        *pictures(context.figures, FIGURES, "fig8_pooled", "fig9_unseen"),
         Heading("Logs"),
         *_logs(context),
         Heading("Method"),
@@ -132,10 +135,10 @@ def overview_of(study: Study, context: StudyContext) -> list[Block]:
         study: The numbers.
         context: What else the report states.
     """
-    blocks: list[Block] = [_rewards_table(study), Bullets(tuple(_claims_lines(study.claims)))]
+    blocks: list[Block] = [rewards_table(study), Bullets(tuple(_claims_lines(study.claims)))]
     if context.cells:
         same = sum(same for _, same in context.cells)
-        blocks.append(Paragraph(f"cells as published: {same} of {len(context.cells)} paths"))
+        blocks.append(Paragraph(f"cells as published: {same} of {counted(len(context.cells), 'path')}"))
     return blocks
 
 
@@ -163,7 +166,10 @@ def remarks(demonstrations: Sequence[Demonstration], answers: Iterable[Answer]) 
         lines.append(f"cycle {', '.join(map(str, others))}: shown, but not fitted; only cycles 1 and 2 are fitted")
     unknown = sum(one.cycle is None and one.set is None for one in pushed)
     if unknown:
-        lines.append(f"{unknown} trials of the condition force have neither cycle nor set: they are not fitted")
+        lines.append(
+            f"{unknown} trial{Number(unknown):|s} of the condition force {Number(unknown):has|have} neither "
+            f"cycle nor set: {Number(unknown):it is|they are} not fitted"
+        )
     aside = sorted({one.set for one in pushed if one.set is not None and one.cycle is not None})
     if aside:
         lines.append(
@@ -183,80 +189,19 @@ def _claims_lines(claims: Sequence[Claim]) -> Iterator[str]:
         yield f"**{claim.verdict.value}**: {claim.text} ({claim.question}: {numbers}.)"
 
 
-def _claims_table(claims: Iterable[Claim]) -> Table:
-    """The differences that the verdicts rest on."""
-    columns = (
-        Column("claim"),
-        Column("quantity"),
-        Column("unit"),
-        Column("mean_difference", "mean difference", DECIMALS, sign=True),
-        Column("interval", "95 % interval", DECIMALS, sign=True),
-        Column("n"),
-        Column("margin", "close within ±", DECIMALS),
-        Column("participants_against", "participants against"),
-        Column("verdict"),
-    )
-    rows = tuple(
-        (
-            claim.title,
-            one.quantity,
-            one.unit,
-            one.paired.mean,
-            Interval(*one.paired.student),
-            one.paired.n,
-            one.margin,
-            ", ".join(one.against) or "none",
-            one.verdict.value,
-        )
-        for claim in claims
-        for one in claim.differences
-    )
-    notes = ["Claims of a larger value have no margin."]
-    if any(row[5] == 1 for row in rows):
-        notes.append("One participant has no interval.")
-    if any(one.margin is not None and np.isnan(one.margin) for claim in claims for one in claim.differences):
-        notes.append("A margin needs a participant with two second-cycle paths.")
-    return Table(columns, rows, "Paired differences over participants.", " ".join(notes))
-
-
-def _pictures(context: StudyContext, *names: str) -> list[Block]:
-    return [Picture(context.figures[name], FIGURES[name]) for name in names if name in context.figures]
-
-
 def _tasks(study: Study, context: StudyContext) -> list[Block]:
     """The obstacle course and the questionnaire, where there are any."""
     blocks: list[Block] = []
     if study.completion_s:
-        blocks += [Heading("Obstacle course"), _completion_table(study.completion_s)]
-        blocks += _pictures(context, "fig2_completion_times")
+        blocks += [Heading("Obstacle course"), completion_table(study.completion_s)]
+        blocks += pictures(context.figures, FIGURES, "fig2_completion_times")
     if "fig4_answers" in context.figures:
-        blocks += [Heading("Questionnaire"), _answers_table(context.answers), *_pictures(context, "fig4_answers")]
+        blocks += [
+            Heading("Questionnaire"),
+            answers_table(context.answers),
+            *pictures(context.figures, FIGURES, "fig4_answers"),
+        ]
     return blocks
-
-
-def _completion_table(completion_s: Mapping[str, Mapping[str, tuple[float, ...]]]) -> Table:
-    """Completion times by modality."""
-    columns = (
-        Column("modality"),
-        Column("n"),
-        Column("median_s", "median s", 1),
-        Column("time_s", "mean ± standard deviation s", 1),
-    )
-    every = {modality: [time for own in known.values() for time in own] for modality, known in completion_s.items()}
-    rows = tuple(
-        (modality, len(times), median(times), Spread(*mean_and_spread(times))) for modality, times in every.items()
-    )
-    return Table(columns, rows, "Completion times.")
-
-
-def _answers_table(bars: Sequence[Shares]) -> Table:
-    """Answers by question and modality."""
-    levels = len(bars[0].counts) if bars else 0
-    columns = tuple(map(Column, ("question", "modality", "n")))
-    columns += (Column("median", decimals=1),)
-    columns += tuple(Column(f"answers_{level}", f"answers {level}") for level in range(1, levels + 1))
-    rows = tuple((one.question, one.modality, one.count, one.median, *one.counts.tolist()) for one in bars)
-    return Table(columns, rows, "Answers to the questionnaire.")
 
 
 def _properties(groups: Sequence[GroupMetrics]) -> list[Block]:
@@ -271,9 +216,9 @@ def _rewards(study: Study) -> list[Block]:
     """Parameters, and how far to rely on them."""
     blocks: list[Block] = [
         formula(study.terms),
-        _rewards_table(study),
+        rewards_table(study),
         Paragraph(_ERRORS),
-        _intervals_table(study),
+        intervals_table(study),
     ]
     pooled = study.pooled.second
     if pooled is not None and study.published_log_likelihood is not None:
@@ -282,95 +227,15 @@ def _rewards(study: Study) -> list[Block]:
         blocks.append(
             Paragraph(
                 f"The published parameters were learnt from the second cycles of {PUBLISHED_PARTICIPANTS} people. "
-                f"Under them the second cycles of the {here} participants here have a log-likelihood of "
+                f"Under them the second cycles of the {counted(here, 'participant')} here have a log-likelihood of "
                 f"{published:.4f} nats, under the pooled fit {pooled.fit.log_likelihood:.4f} nats: a difference of "
                 f"{gain:+.3f} nats."
             )
         )
-    cycles = [cycle for one in study.participants for cycle in (one.first, one.second) if cycle is not None]
-    if any(_is_weak(cycle) for cycle in cycles):
+    both = [cycle for one in study.participants for cycle in (one.first, one.second) if cycle is not None]
+    if any(is_weak(cycle) for cycle in both):
         blocks.append(Paragraph(_UNIDENTIFIED))
     return blocks
-
-
-def _rewards_table(study: Study) -> Table:
-    """Parameters by participant and cycle, pooled, and as published."""
-    parameters = parameters_of(study.terms)
-    rows: list[tuple[Cell, ...]] = [
-        _fit_row(name, found.fit, found.fit.standard_errors) for name, found in _cycles(study)
-    ]
-    pooled = study.pooled.second
-    if pooled is not None and pooled.fit.clustered_errors is not None:
-        rows.append(_fit_row("all, errors by participant", pooled.fit, pooled.fit.clustered_errors))
-    note = ""
-    if study.published_log_likelihood is not None:
-        name = f"published, {PUBLISHED_PARTICIPANTS} participants"
-        values = [Spread(PUBLISHED_THETA.get(parameter.name, float("nan")), float("nan")) for parameter in parameters]
-        rows.append((name, PUBLISHED_DEMONSTRATIONS, *values, study.published_log_likelihood, "published"))
-        note = "The log-likelihood of the published parameters is that of the second cycles here."
-    columns = (
-        Column("learnt_from", "learnt from"),
-        Column("n"),
-        *(Column(parameter.name, f"{parameter.name} {parameter.unit}".strip(), DECIMALS) for parameter in parameters),
-        Column("log_likelihood", "log-likelihood", DECIMALS),
-        Column("status"),
-    )
-    return Table(columns, tuple(rows), "Parameters ± standard errors, lengths in metres.", note)
-
-
-def _fit_row(name: str, fit: Fit, errors: FloatArray) -> tuple[Cell, ...]:
-    values = [Spread(value, error) for value, error in zip(fit.reward.theta, errors.tolist(), strict=True)]
-    return name, fit.demonstrations, *values, fit.log_likelihood, fit.status.value
-
-
-def _cycles(study: Study) -> Iterator[tuple[str, CycleFit]]:
-    """What was learnt, with the names of participant and cycle."""
-    for one in (*study.participants, study.pooled):
-        for cycle, found in ((FIRST, one.first), (SECOND, one.second)):
-            if found is not None:
-                yield f"{_whose(one)}, cycle {cycle}", found
-
-
-def _whose(learnt: Learnt) -> str:
-    return "all" if learnt.participant is None else learnt.participant
-
-
-def _is_weak(cycle: CycleFit) -> bool:
-    """Whether a fit is unsure of a parameter: it did not converge, or a standard error exceeds half of its value."""
-    values, errors = np.abs(cycle.fit.reward.theta), cycle.fit.standard_errors
-    return cycle.fit.status is not Status.CONVERGED or bool((errors > values / 2).any())
-
-
-def _intervals_table(study: Study) -> Table:
-    """The intervals of the parameters by participant and cycle; an open end has no number."""
-    parameters = parameters_of(study.terms)
-    rows: list[tuple[Cell, ...]] = []
-    for name, found in _cycles(study):
-        if found.intervals:
-            ends = {one.parameter: interval_cell(one) for one in found.intervals[0].ends}
-            rows.append((name, *(ends.get(parameter.name) for parameter in parameters)))
-    columns = (
-        Column("learnt_from", "learnt from"),
-        *(Column(parameter.name, f"{parameter.name} {parameter.unit}".strip(), DECIMALS) for parameter in parameters),
-    )
-    return Table(columns, tuple(rows), "95 % intervals, of several participants from the scatter between them.")
-
-
-def _closeness_table(study: Study) -> Table:
-    """Expected properties beside demonstrated ones."""
-    names = ("demonstrated", "expected")
-    columns = tuple(Column(f"{m.name}_{name}", f"{m.heading}: {name}", 2) for m in PAPER_METRICS for name in names)
-    rows: list[tuple[Cell, ...]] = []
-    for name, found in _cycles(study):
-        if found.near is not None:
-            both = (found.near.demonstrated, found.near.learnt)
-            cells = (Spread(row.expected(m.name), row.std[m.name]) for m in PAPER_METRICS for row in both)
-            rows.append((name, *cells))
-    caption = (
-        "Paths of the second cycle through the centres of their cells (mean ± standard deviation over paths), and the "
-        "policy's expectation in their scenes (mean ± standard deviation of one path)."
-    )
-    return Table((Column("policy_of", "policy of"), *columns), tuple(rows), caption)
 
 
 def _logs(context: StudyContext) -> list[Block]:
@@ -381,7 +246,9 @@ def _logs(context: StudyContext) -> list[Block]:
         other = sorted(name for name, same in context.cells if not same)
         extra = f"; others: {', '.join(other)}" if other else ""
         same = len(context.cells) - len(other)
-        blocks.append(Paragraph(f"Cells equal to those published: **{same} of {len(context.cells)} paths**{extra}."))
+        blocks.append(
+            Paragraph(f"Cells equal to those published: **{same} of {counted(len(context.cells), 'path')}**{extra}.")
+        )
     return [*blocks, Bullets(tuple(context.notes))] if context.notes else blocks
 
 

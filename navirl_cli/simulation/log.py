@@ -207,6 +207,7 @@ class _Clock:
         self._received = t_ns + rng.integers(*LATENCY_NS, size=len(t_ns))
 
     def at(self, step: int) -> int:
+        """When the measurement of one step is received, ns."""
         return int(self._received[step])
 
     def at_steps(self, steps: IntArray) -> tuple[IntArray, IntArray]:

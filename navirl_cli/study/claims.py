@@ -9,7 +9,8 @@ import numpy as np
 from navirl_cli.evaluation.compare import DRIVEN, ON_GRID
 from navirl_cli.evaluation.groups import Measured, by_participant
 from navirl_cli.evaluation.lines import LEAVES_M
-from navirl_cli.evaluation.metrics import PAPER_METRICS, Metric
+from navirl_cli.evaluation.metric import Metric
+from navirl_cli.evaluation.metrics import PAPER_METRICS
 from navirl_cli.evaluation.paired import Paired, paired
 from navirl_cli.study.learning import Learnt
 from navirl_cli.study.measures import with_people

@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from navirl_cli.demos.demonstration import Condition, Demonstration
-from navirl_cli.errors import DemonstrationError
+from navirl_cli.errors import DemonstrationError, counted
 from navirl_cli.evaluation.groups import GroupMetrics, Measured
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.likelihood import log_likelihood
@@ -116,7 +116,7 @@ def _refusal(demonstrations: Sequence[Demonstration]) -> DemonstrationError:
     found = sorted(
         {f"{'no cycle' if one.cycle is None else f'cycle {one.cycle}'}, {one.set or 'no set'}" for one in pushed}
     )
-    there = f"{len(pushed)} trials of it ({'; '.join(found)})" if pushed else "no trial of that condition"
+    there = f"{counted(len(pushed), 'trial')} of it ({'; '.join(found)})" if pushed else "no trial of that condition"
     return DemonstrationError(
         f"a study needs trials of the condition force in cycle {SECOND} and without a set, found {there}; "
         "describe the trials in the logs' metadata record navirl.session (see the documentation of session records)"

@@ -11,7 +11,7 @@ from navirl_cli.artefacts.rewards import read_reward
 from navirl_cli.errors import NavirlError
 from navirl_cli.irl.reward import Reward
 from navirl_cli.planning.smooth import Limits
-from navirl_cli.reports.fit import remarks
+from navirl_cli.reports.fit_remarks import remarks
 from navirl_cli.reports.watch import learnt_line
 from navirl_cli.watching.folder import Folder, Look, pause_s
 from navirl_cli.watching.learning import (

@@ -54,7 +54,7 @@ def _group_option(count: str) -> Callable[[Function], Function]:
 @section("Learnt paths", reward_option, person_option, samples_option(), seed_option)
 def ranks(
     page: Page,
-    demos: Path,
+    demos: tuple[Path, ...],
     choosing: Choosing,
     reward: Path,
     person: str | None,
@@ -73,7 +73,7 @@ def ranks(
     from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
     from navirl_cli.reports.ranks import rank_lines
 
-    everyone = demonstrations_in(demos)
+    everyone = demonstrations_in(*demos)
     learnt = read_reward_for(reward, everyone, person)
     trained = learnt.trained(everyone)
     demonstrations = choosing.subset.of(everyone)
@@ -112,7 +112,7 @@ def ranks(
 @section("Scene", trial_option, crop_option)
 def compare(
     page: Page,
-    demos: Path,
+    demos: tuple[Path, ...],
     choosing: Choosing,
     rewards: tuple[Path, ...],
     groups: tuple[str, ...],
@@ -129,7 +129,7 @@ def compare(
     if groups and trial is not None:
         raise click.UsageError("--trial selects the scene of --reward; --group draws all trials of the groups.")
     refuse_unused("--reward", "everything", used=bool(rewards))
-    everyone = demonstrations_in(demos)
+    everyone = demonstrations_in(*demos)
     if groups:
         _draw_groups(page, choosing.of(everyone), groups, crop=crop)
         return

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     crop_option,
     click.option("--together", is_flag=True, help="One map for all groups, also with more than 40 paths."),
 )
-def paths(page: Page, demos: Path, choosing: Choosing, crop: bool, together: bool) -> None:
+def paths(page: Page, demos: tuple[Path, ...], choosing: Choosing, crop: bool, together: bool) -> None:
     """Draw all driven paths over the map, by condition.
 
     As in Fig. 3 of the paper. Stretches in contact are thicker. More than 40 paths have a map for each group.
@@ -48,7 +48,7 @@ def paths(page: Page, demos: Path, choosing: Choosing, crop: bool, together: boo
     from navirl_cli.figures.conditions import draw_path_panels, panels_of
     from navirl_cli.figures.paths import draw_paths
 
-    demonstrations = choosing.of(demonstrations_in(demos))
+    demonstrations = choosing.of(demonstrations_in(*demos))
     panels = [] if together else panels_of(demonstrations)
     if panels:
         page.draw(lambda axes: draw_path_panels(axes, panels, crop=crop), panels=len(panels), columns=2)
@@ -80,7 +80,7 @@ def paths(page: Page, demos: Path, choosing: Choosing, crop: bool, together: boo
 @section("Look", click.option("--bars", "as_bars", is_flag=True, help="Bars from 0, as in Fig. 7 of the paper."))
 def properties(
     page: Page,
-    demos: Path,
+    demos: tuple[Path, ...],
     choosing: Choosing,
     reward: Path | None,
     person: str | None,
@@ -93,21 +93,16 @@ def properties(
     Points are means with their 95 % intervals, from participants' means, and with standard deviations as thin lines.
     """
     from navirl_cli.evaluation.groups import group_of
-    from navirl_cli.evaluation.metrics import PAPER_METRICS
-    from navirl_cli.figures.properties import bars_of, draw_properties, height_for
+    from navirl_cli.figures.properties import bars_of, draw_properties, property_layout
 
     refuse_unused("--reward", "person", "samples", "seed", "everything", used=reward is not None)
-    everyone = demonstrations_in(demos)
+    everyone = demonstrations_in(*demos)
     learnt = None if reward is None else read_reward_for(reward, everyone, person)
     demonstrations = choosing.of(everyone, [] if learnt is None else [learnt])
     result = _compared(demonstrations, learnt, samples, seed)
     taught = set() if learnt is None else {group_of(one) for one in demonstrations if one.id in learnt.demonstrations}
     bars = bars_of(result.groups, taught)
-    page.draw(
-        lambda axes: draw_properties(axes, bars, as_bars=as_bars),
-        height_in=height_for(bars, page.width_in),
-        panels=len(PAPER_METRICS),
-    )
+    page.draw(lambda axes: draw_properties(axes, bars, as_bars=as_bars), **property_layout(bars, page.width_in))
     finish(result.notes)
 
 
@@ -122,14 +117,14 @@ def properties(
 @demos_argument
 @choice_options(reward=False, trial=False)
 @section("Scene", trial_option, crop_option)
-def forces(page: Page, demos: Path, choosing: Choosing, trial: str | None, crop: bool) -> None:
+def forces(page: Page, demos: tuple[Path, ...], choosing: Choosing, trial: str | None, crop: bool) -> None:
     """Draw the forces of one trial, over time and along its path.
 
     Contacts are shaded, with peak force and impulse.
     """
     from navirl_cli.figures.forces import draw_forces
 
-    one = trial_of(choosing.of(demonstrations_in(demos)), trial)
+    one = trial_of(choosing.of(demonstrations_in(*demos)), trial)
     page.draw(lambda axes: draw_forces(axes, one, crop=crop), panels=2, columns=1)
 
 

@@ -99,7 +99,7 @@ def scene_options(function: Function) -> Function:
     @wraps(function)
     def packed(
         page: Page,
-        demos: Path,
+        demos: tuple[Path, ...],
         reward: Path,
         choosing: Choosing,
         person: str | None,
@@ -107,7 +107,7 @@ def scene_options(function: Function) -> Function:
         **others: Any,
     ) -> Any:
         refuse_unused("--overlay samples", "samples", "seed", used=SAMPLES in others["overlay"])
-        everyone = demonstrations_in(demos)
+        everyone = demonstrations_in(*demos)
         learnt = read_reward_for(reward, everyone, person)
         one, demonstrations = scene_of(choosing, everyone, [learnt], trial)
         return function(page, Sight(demonstrations, one, learnt.reward, **others))

@@ -24,6 +24,8 @@ GROUP, VARIABLE = "navirl.terms", "NAVIRL_TERMS"
 #: What a term has.
 _NEEDED = ("name", "formula", "symbols", "parameters", "about_people", "about_turns", "on")
 _NAME, _WORD = re.compile(r"[a-z][a-z0-9-]*"), re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+#: Of the names of modules from files.
+_PREFIX = "navirl_term_"
 #: Terms that this process has taken from files, by name.
 _taken: dict[str, Term] = {}
 
@@ -52,6 +54,14 @@ def terms_named(words: Iterable[str | Term]) -> tuple[Term, ...]:
 def names_of(terms: Iterable[Term]) -> list[str]:
     """The names of terms; :func:`terms_named` finds them in this process."""
     return [_own(term).name for term in terms]
+
+
+def word_of(term: Term) -> str:
+    """The word that names a term to the command line: its name, or its file without folders."""
+    module = sys.modules.get(type(term).__module__)
+    if module is None or not module.__name__.startswith(_PREFIX) or module.__file__ is None:
+        return _own(term).name
+    return f"{Path(module.__file__).name}:{type(term).__name__}"
 
 
 def _own(term: Term) -> Term:
@@ -106,7 +116,7 @@ def _module(path: Path, word: str) -> ModuleType:
         raise RewardError(
             f"{word}: expected a Python file and a class as my_term.py:MyTerm: {error.strerror}"
         ) from error
-    name = f"navirl_term_{sha256(bytes(path.resolve()) + content).hexdigest()[:16]}"
+    name = f"{_PREFIX}{sha256(bytes(path.resolve()) + content).hexdigest()[:16]}"
     if name not in sys.modules:
         module = ModuleType(name)
         module.__file__ = str(path)

@@ -182,6 +182,16 @@ class LogFile:
             len(known) < len(piece.indexes) or not known or any(wanted(self._definitions.channel(one)) for one in known)
         )
 
+    @property
+    def requests_of_times(self) -> int:
+        """Number of requests that :meth:`times` makes; 0 for a file of this machine."""
+        return self._raw.requests(self._indexes)
+
+    @property
+    def _indexes(self) -> list[tuple[int, int]]:
+        """Where message indexes stand."""
+        return [(one.start + one.length, one.stop) for one in self._survey.planned()]
+
     def times(self) -> dict[int, IntArray]:
         """Times of receipt in ns of all messages by channel, ascending; from message indexes where possible."""
         found = self._times()
@@ -193,7 +203,7 @@ class LogFile:
 
     def _times(self) -> dict[int, IntArray]:
         found: dict[int, list[IntArray]] = {}
-        self._raw.plan([(one.start + one.length, one.stop) for one in self._survey.planned()])
+        self._raw.plan(self._indexes)
         for piece in filter(None, self._survey.pieces()):
             times = self._opener.times(piece)
             if times is None:

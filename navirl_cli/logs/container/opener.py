@@ -6,6 +6,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from navirl_cli.arrays import IntArray
+from navirl_cli.errors import Number, counted
 from navirl_cli.logs.container import records
 from navirl_cli.logs.container.batches import Batch, Channel, Definitions, message_batch
 from navirl_cli.logs.container.chunks import Decompressor, OpenedPiece, Piece, indexes_of, open_chunk
@@ -125,7 +126,10 @@ class Opener:
                 if wanted(channel := self._definitions.channel(number)):
                     yield from self._batch_of(piece, channel, opened, offsets, indexes.get(number))
             elif len(offsets):
-                reason = f"{len(offsets)} messages of channel {number} are lost, because no record defines the channel"
+                reason = (
+                    f"{counted(len(offsets), 'message')} of channel {number} {Number(len(offsets)):is|are} lost, "
+                    "because no record defines the channel"
+                )
                 self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
 
     def _batch_of(
@@ -141,12 +145,16 @@ class Opener:
         batch = self._batch(piece, channel, opened, _united(offsets, listed))
         found = 0 if batch is None else len(batch.starts)
         if found < len(listed) and not piece.cut:
-            reason = f"the chunk's message index lists {len(listed)} messages of {channel.topic}, {found} were found"
+            reason = (
+                f"the chunk's message index lists {counted(len(listed), 'message')} of {channel.topic}, "
+                f"{found} {Number(found):was|were} found"
+            )
             self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
             self._damage.lost_messages[channel.id] += len(listed) - found
         elif index is not None and (wrong := _wrong_times(batch, index)) and not piece.cut:
             reason = (
-                f"the chunk's message index states other times than {wrong} messages of {channel.topic}; theirs count"
+                f"the chunk's message index states other times than {counted(wrong, 'message')} of "
+                f"{channel.topic}; {Number(wrong):the message's own counts|theirs count}"
             )
             self._damage.add(piece.start, piece.stop, reason, piece.span_ns)
         if batch is not None:

@@ -49,6 +49,10 @@ class RawFile:
     def plan(self, ranges: Sequence[tuple[int, int]]) -> None:
         """Name ranges [start, stop) that are going to be read; of no use where reading is cheap."""
 
+    def requests(self, ranges: Sequence[tuple[int, int]]) -> int:  # noqa: ARG002
+        """Number of requests to a store that ranges [start, stop) in the file's order take: none here."""
+        return 0
+
     def read(self, start: int, stop: int) -> bytes:
         """Bytes [start, stop), fewer where the file ends."""
         blocks, at, stop = [], start, min(stop, self.size)

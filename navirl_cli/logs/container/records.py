@@ -131,11 +131,13 @@ class _Cursor:
     at: int = 0
 
     def take(self, layout: str) -> tuple[int, ...]:
+        """The values of a layout of :mod:`struct`; the place moves behind them."""
         values: tuple[int, ...] = struct.unpack_from(layout, self.data, self.at)
         self.at += struct.calcsize(layout)
         return values
 
     def string(self) -> str:
+        """A text in UTF-8 behind its length in bytes, as it stands."""
         return self.blob().decode()
 
     def name(self) -> str:
@@ -144,6 +146,7 @@ class _Cursor:
         return text if text.isprintable() else "".join(map(_printable, text))
 
     def blob(self) -> bytes:
+        """The bytes behind their length; ValueError if the record is shorter."""
         (size,) = self.take("<I")
         if self.at + size > len(self.data):
             raise ValueError(f"a text of {size} bytes does not fit into a record of {len(self.data)} bytes")
@@ -151,6 +154,7 @@ class _Cursor:
         return bytes(self.data[self.at - size : self.at])
 
     def integers(self) -> dict[int, int]:
+        """A map of 16-bit keys to 64-bit values, behind its length in bytes."""
         return dict(struct.iter_unpack("<HQ", self.blob()))
 
 

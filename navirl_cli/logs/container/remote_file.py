@@ -58,6 +58,12 @@ class RemoteFile(RawFile):
             there = list(self._blocks)
         self._planned = _joined([one for one in ranges if _holding(there, *one) is None])
 
+    def requests(self, ranges: Sequence[Range]) -> int:
+        """As :meth:`RawFile.requests`."""
+        with self._lock:
+            there = list(self._blocks)
+        return len(_joined([one for one in ranges if _holding(there, *one) is None]))
+
     def read(self, start: int, stop: int) -> bytes:
         """As :meth:`RawFile.read`."""
         stop = min(stop, self.size)

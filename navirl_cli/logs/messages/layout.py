@@ -92,13 +92,16 @@ class _Walker:
 
     @property
     def cdr(self) -> bool:
+        """Whether the message is aligned and its texts end with NUL, as in CDR; ROS 1 has neither."""
         return self.schema.encoding == "cdr"
 
     def message(self, typename: str, prefix: str) -> None:
+        """Walk over the fields of a type; the prefix is the dotted path of the message that holds them."""
         for name, desc in self.schema.fields(typename):
             self.one(desc, prefix + name)
 
     def one(self, desc: FieldDesc, path: str) -> None:
+        """Walk over a field of any type; _UnfitError if the message has more fields than a layout may have."""
         self.steps += 1
         if self.steps > _MAX_FIELDS:
             raise _UnfitError("too many fields")
@@ -112,6 +115,7 @@ class _Walker:
             self.items(desc[1][0], self.length(minimum=0), path)
 
     def nested(self, typename: str, path: str) -> None:
+        """Walk over a message in the message; a wanted time is kept as two integers."""
         if typename in TIMES and path in self.wanted:
             self.align(4)
             name = self.entry(path)
@@ -120,6 +124,7 @@ class _Walker:
         self.message(typename, path + ".")
 
     def primitive(self, name: str, path: str) -> None:
+        """Walk over a number or a text; the text's length and closing NUL are checks of the layout."""
         if name != "string":
             self.numbers(name, None, path)
             return
@@ -135,6 +140,7 @@ class _Walker:
             self.checks.append((self.at - 1, "u1", 0))
 
     def numbers(self, name: str, count: int | None, path: str) -> None:
+        """Walk over a number, or over a fixed array of so many; 0 numbers take no place and no alignment."""
         if name not in PRIMITIVES:
             raise _UnfitError(name)
         if count == 0:
@@ -153,6 +159,7 @@ class _Walker:
         self.skip(size * (1 if count is None else count))
 
     def items(self, desc: FieldDesc, count: int, path: str) -> None:
+        """Walk over the entries of an array or a sequence; those of numbers are skipped at once."""
         if f"{path}[]" in self.sequences:
             self.counts[f"{path}[]"] = count
         if desc[0] == Nodetype.BASE and desc[1][0] != "string":
@@ -169,6 +176,7 @@ class _Walker:
         return f"{path}#{self.entries[path] - 1}"
 
     def length(self, minimum: int) -> int:
+        """Read the length of a text or sequence, which other messages of the layout must have too."""
         self.align(4)
         if self.at + 4 > len(self.payload):
             raise _UnfitError("a length after the end")
@@ -180,10 +188,12 @@ class _Walker:
         return int(value)
 
     def align(self, size: int) -> None:
+        """Move to the next multiple of a size in bytes, counted from the first byte of the message."""
         if self.cdr:
             self.at += -(self.at - self.base) % size
 
     def skip(self, size: int) -> None:
+        """Move on by so many bytes; _UnfitError behind the end of the message."""
         self.at += size
         if self.at > len(self.payload):
             raise _UnfitError("a field after the end")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from navirl_cli.arrays import IntArray
+from navirl_cli.errors import Number, counted
 from navirl_cli.logs.container.batches import Batch, Channel
 from navirl_cli.logs.container.damage import Damage
 from navirl_cli.logs.container.log_file import LogFile, threads_here
@@ -285,7 +286,8 @@ def check(path: Log, progress: Callable[[float], None] | None = None, threads: i
                 and not np.array_equal(found[channel.id], listed[channel.id])
             ]
             fewer = [
-                f"the message indexes list {count} messages of {channel.topic}, {len(found[channel.id])} were found"
+                f"the message indexes list {counted(count, 'message')} of {channel.topic}, "
+                f"{len(found[channel.id])} {Number(len(found[channel.id])):was|were} found"
                 for channel in log.channels
                 if channel.id in found and (count := len(listed.get(channel.id, ()))) < len(found[channel.id])
             ]
@@ -301,11 +303,12 @@ def _receipts(batch: Batch) -> tuple[int, IntArray]:
 
 def _missing(log: LogFile, channels: Iterable[Channel], seen: Mapping[int, int]) -> list[str]:
     """The channels of which the statistics count more messages than were found and than are known to be lost."""
-    counted = _counted(log) or {}
+    known = _counted(log) or {}
     return [
-        f"the statistics count {count} messages of {channel.topic}, {seen.get(channel.id, 0)} were found"
+        f"the statistics count {counted(count, 'message')} of {channel.topic}, {there} {there:was|were} found"
         for channel in channels
-        if (count := counted.get(channel.id, 0)) > seen.get(channel.id, 0) + log.lost.get(channel.id, 0)
+        if (count := known.get(channel.id, 0))
+        > (there := Number(seen.get(channel.id, 0))) + log.lost.get(channel.id, 0)
     ]
 
 
@@ -323,8 +326,9 @@ def _undecoded(batches: Sequence[DecodedBatch]) -> list[str]:
     error = next(decoded.error for decoded in batches if decoded.error)
     name = batches[0].channel.schema_name
     topic = batches[0].channel.topic
-    many = f"all {seen}" if bad == seen else f"{bad} of {seen}"
-    return [f"{many} messages of {topic} do not decode as {name} and are lost ({error})"]
+    many = f"{bad} of {seen}" if bad < seen else "the only" if seen == 1 else f"all {seen}"
+    lost = f"{Number(bad):does|do} not decode as {name} and {Number(bad):is|are} lost ({error})"
+    return [f"{many} message{Number(seen):|s} of {topic} {lost}"]
 
 
 def _contents(log: LogFile, times: Mapping[int, IntArray]) -> Contents:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from navirl_cli.arrays import IntArray
 from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.messages.decode import Columns, DecodedBatch, Decoder, empty_column
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.packing import Packer
-from navirl_cli.logs.messages.schema import Schema, SchemaError, parse_definition
+from navirl_cli.logs.messages.schema import Schema, SchemaError
 
 
 @dataclass(frozen=True, eq=False)

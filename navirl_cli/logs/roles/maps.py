@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from navirl_cli.errors import FrameError, LogError
+from navirl_cli.errors import FrameError, LogError, counted
 from navirl_cli.logs.findings import Finding, Findings, Kind
 from navirl_cli.logs.map_geometry import check_geometry, is_empty, yaw_of
 from navirl_cli.logs.occupancy import MapHistory, Sheet
@@ -138,7 +138,7 @@ def _told(topic: str, history: MapHistory) -> Findings:
     cells = shapes[0] if len(shapes) == 1 else f"{shapes[0]} to {shapes[-1]}"
     updates = len(history.sheets) - len(whole)
     maps = f"{len(whole)} different maps" if len(whole) > 1 else "one map"
-    detail = f"{maps} of {cells} cells" + (f", {updates} update{'s' if updates > 1 else ''}" if updates else "")
+    detail = f"{maps} of {cells} cells" + (f", {counted(updates, 'update')}" if updates else "")
     return (Finding(Kind.MAP_CHANGES, topic, len(history.sheets), detail=detail),)
 
 

@@ -4,11 +4,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from navirl_cli.errors import MOST_NAMES, LogError, unknown
+from navirl_cli.errors import MOST_NAMES, LogError, counted, unknown
 from navirl_cli.logs.container.batches import Channel
 from navirl_cli.logs.findings import Finding, Findings, Kind
+from navirl_cli.logs.messages.definitions import parse_definition
 from navirl_cli.logs.messages.reader import Contents
-from navirl_cli.logs.messages.schema import SchemaError, full_name, parse_definition
+from navirl_cli.logs.messages.schema import SchemaError, full_name
 from navirl_cli.logs.messages.series import lacks_definition
 from navirl_cli.logs.roles import message_types
 from navirl_cli.logs.roles.message_types import MessageType
@@ -360,7 +361,8 @@ def undefined(log: str, topics: Sequence[Topic]) -> LogError | None:
     if not channels or not all(map(lacks_definition, channels)):
         return None
     return LogError(
-        f"{log}: none of its {len(topics)} topics has a definition of its messages, so that nothing can be decoded; "
+        f"{log}: none of its {counted(len(topics), 'topic')} has a definition of its messages, so that nothing "
+        f"can be decoded; "
         "convert it on a computer that has the message packages, for example with ros2 bag convert"
     )
 
