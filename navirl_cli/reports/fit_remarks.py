@@ -11,7 +11,7 @@ from navirl_cli.errors import Number, counted
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.uncertainty import correlation
 from navirl_cli.reports.evidence import evidence_remarks, reach_warnings
-from navirl_cli.reports.persons import person_warnings
+from navirl_cli.reports.persons import ended, person_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -98,9 +98,8 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
         lines.append(
             f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
         )
-    ended = Status(content["status"])
-    if status and ended is not Status.CONVERGED:
-        lines.append(f"{ended.value}: {ended.advice}")
+    if status and content["status"] != Status.CONVERGED.value:
+        lines.append(f"{content['status']}: {ended(content)}")
     return lines
 
 
