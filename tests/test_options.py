@@ -13,13 +13,14 @@ from command_line import options
 import navirl_cli as navirl_python
 from navirl_cli.artefacts.demonstrations import demonstrations_document, settings_document
 from navirl_cli.artefacts.options import NOT_KEPT, option_words
+from navirl_cli.artefacts.steps import extract_words
 from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.commands.extract import extract
 from navirl_cli.commands.usage import given_words
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.logs.load import LoadOptions
-from navirl_cli.reports.made import Made, extract_words, made_blocks
+from navirl_cli.reports.made import Made, made_blocks
 
 #: A value of every option of extract and fit that is not its default, as words, and as the command line gives it back.
 EXTRACT = {
