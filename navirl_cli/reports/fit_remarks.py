@@ -91,6 +91,7 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
             if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
         ]
     lines += _bias_warnings(parameters)
+    lines += _outside_warnings(content)
     lines += reach_warnings(content)
     lines += person_warnings(content)
     count = len(content["participants"])
@@ -119,3 +120,23 @@ def _bias_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
     else:
         remedy = "subtract it with `correct_bias`"
     return [f"maximum likelihood is expected to be off in {words}; {remedy}"]
+
+
+def _outside_warnings(content: Mapping[str, Any]) -> list[str]:
+    """The values that do not lie in their own interval, because the interval leaves the regulariser out."""
+    values = {one["name"]: one["value"] for one in content["parameters"]}
+    outside = dict.fromkeys(
+        one["name"]
+        for found in content.get("intervals") or ()
+        for one in found["parameters"]
+        if (one["lower"] is not None and values[one["name"]] < one["lower"])
+        or (one["upper"] is not None and values[one["name"]] > one["upper"])
+    )
+    if not outside or not content["l2"]:
+        return []
+    count, words = Number(len(outside)), " and ".join(outside)
+    line = (
+        f"the {count:value|values} of {words} {count:lies|lie} outside the interval: the regulariser decides "
+        f"{count:it|them}, because the demonstrations say so little; read the intervals, not the values"
+    )
+    return [line]
