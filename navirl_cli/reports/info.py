@@ -5,6 +5,7 @@ from math import hypot
 from typing import Any
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
+from navirl_cli.artefacts.steps import held_steps
 from navirl_cli.documents.document import Block, Bullets, Heading
 from navirl_cli.documents.tables import Column, Table
 from navirl_cli.errors import ArgumentError, unknown
@@ -108,6 +109,7 @@ def _of_demonstrations(content: Content) -> dict[str, Any]:
         "with_wrench": sum(one["contacts"] is not None for one in own),
         "truncated": sum(bool(one["truncated"]) for one in own),
         "with_warnings": sum(bool(one["warnings"]) for one in own),
+        "made_by": [one.line for one in held_steps(content)],
     }
 
 
