@@ -119,10 +119,11 @@ def rows(count: int) -> list[Row]:
 def _rows(head: str, people: int, done: Sequence[Covered]) -> list[Row]:
     slack = 2 * 100 * np.sqrt(0.05 * 0.95 / len(done))
     low, high = BAR[0] - slack, min(100.0, BAR[1] + slack)
-    # Few demonstrations and fewer than ten people are called approximate.
-    sets = [("by participant", "front", people >= 10), ("as if one person", "behind", False)]
-    if people < FEWEST_PARTICIPANTS:
-        sets = [("one person" if people == 1 else "as if one person", "front", False)]
+    # A few people have one set, that of one person. Fewer than ten demonstrations or people are called approximate.
+    sets = [("as if one person", "front", False)] if people < FEWEST_PARTICIPANTS else [
+        ("by participant", "front", people >= 10),
+        ("as if one person", "behind", False),
+    ]  # fmt: skip
     found = []
     for title, name, claims in sets:
         for j, parameter in enumerate(PUBLISHED.parameters):

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 import navirl_cli as navirl
 from navirl_cli.api import plot
-from navirl_cli.api.results import frame_of
+from navirl_cli.api.frames import frame_of
 from navirl_cli.cli import cli
 
 ROOT = Path(__file__).parent.parent

@@ -214,3 +214,20 @@ def test_an_estimate_outside_all_replicates_has_an_interval():
     theta = np.random.default_rng(0).normal(size=(50, 1))
     lower, upper = Bootstrap(theta, 0, 0, 0, np.array([9.0]), np.array([[0.0], [1.0]])).interval()
     assert theta.min() <= lower <= upper <= theta.max()
+
+
+def test_few_participants_are_fitted_with_a_search_for_other_maxima(twelve, found, monkeypatch):
+    asked = []
+
+    def watched(evidence, *args, scan, **named):
+        asked.append(scan)
+        return fit(evidence, *args, scan=scan, **named)
+
+    monkeypatch.setattr(module, "fit", watched)
+    bootstrap(twelve, found, 2, 5, executor=Here())
+    assert not any(asked)
+    asked.clear()
+    names = np.array(twelve.participants)
+    three = twelve.repeated(np.isin(names, np.unique(names)[:3]).astype(int))
+    bootstrap(three, fit(three, START, 0.0), 2, 5, executor=Here())
+    assert asked == [True] * 5

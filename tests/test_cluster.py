@@ -55,7 +55,7 @@ def address():
     import distributed
 
     with distributed.LocalCluster(
-        n_workers=2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=None
+        n_workers=2, processes=False, protocol="tcp", threads_per_worker=1, dashboard_address=":0"
     ) as own:
         yield own.scheduler_address
 

@@ -93,6 +93,13 @@ def test_contacts_are_shaded_from_start_to_end_and_named_above_the_curves():
     assert drawn.over_time.get_ylim()[1] > max(number.xy[1] for number in drawn.numbers)
 
 
+def test_without_measured_times_no_impulse_is_named():
+    _, drawn = drawn_of(replace(pushed(), laid_out_m_s=0.4))
+    assert [number.get_text() for number in drawn.numbers] == ["12.4 N"] * 2
+    assert drawn.over_time.get_xlabel() == "time, laid out at 0.4 m/s [s]"
+    assert "contact (peak)" in {text.get_text() for text in drawn.legend.get_texts()}
+
+
 @pytest.mark.parametrize(
     ("width_in", "spans"),
     [

@@ -16,9 +16,9 @@ from navirl_cli.figures.plan import draw_plans
 from navirl_cli.figures.properties import PropertyBar
 from navirl_cli.figures.ranks import draw_rank_panels, rank_layout
 from navirl_cli.figures.report import draw_conditions, draw_property_panels, draw_scenes
-from navirl_cli.figures.screens import Drawing, save_for_screens
+from navirl_cli.figures.screens import NARROW_DPI, Drawing, save_for_screens
 from navirl_cli.figures.sheet import new_figure
-from navirl_cli.figures.style import COLUMN_IN, LOOKS, PAGE_IN, styled
+from navirl_cli.figures.style import COLUMN_IN, DPI, LOOKS, PAGE_IN, styled
 from navirl_cli.figures.times import draw_completion_times
 from navirl_cli.irl.solved import SolvedScene
 from navirl_cli.planning.paths import Planner
@@ -64,7 +64,7 @@ def test_every_screen_has_a_figure_that_is_as_wide_as_it_says(tmp_path):
             sizes[name], corners[name] = image.size, to_hex(np.array(image.getpixel((0, 0))) / 255)
     assert sizes["a"] == sizes["a_dark"]
     assert sizes["a_narrow"] == sizes["a_narrow_dark"]
-    assert (sizes["a"][0], sizes["a_narrow"][0]) == (int(PAGE_IN * 300), int(COLUMN_IN * 300))
+    assert (sizes["a"][0], sizes["a_narrow"][0]) == (int(PAGE_IN * DPI), int(COLUMN_IN * NARROW_DPI))
     assert corners == {name: LOOKS["dark" if "dark" in name else "paper"].paper.lower() for name in files}
 
 

@@ -305,6 +305,19 @@ def test_few_participants_are_too_few_for_errors_by_participant(evidence):
     assert warnings({**content, "participants": ["p01"]}) == []
 
 
+def test_a_value_outside_its_own_interval_is_named(evidence):
+    content = {**content_of(evidence), "participants": ["p01"], "l2": 1e-3}
+    values = {one["name"]: one["value"] for one in content["parameters"]}
+    ends = [{"name": name, "lower": value - 1, "upper": value + 1} for name, value in values.items()]
+    assert warnings({**content, "intervals": [{"parameters": ends}]}) == []
+    ends[2] |= {"upper": values["a_p"] - 0.5}
+    (line,) = warnings({**content, "intervals": [{"parameters": ends}] * 2})
+    assert line.startswith("the value of a_p lies outside the interval: the regulariser decides it")
+    ends[0] |= {"lower": values["c0"] + 0.5, "upper": None}
+    (line,) = warnings({**content, "intervals": [{"parameters": ends}]})
+    assert line.startswith("the values of c0 and a_p lie outside the interval: the regulariser decides them")
+
+
 def test_demonstrations_without_intervention_are_reported(navirl, files):
     demonstrations = read_demonstrations(files / "one.json")
     some = [replace(one, corrected=number > 1) for number, one in enumerate(demonstrations)]

@@ -114,9 +114,17 @@ class TestCommand:
 
     def test_times_that_were_laid_out_are_no_durations(self, navirl, tmp_path):
         log = write_run(tmp_path / "run.mcap", Run(session={"laid_out_m_s": "0.4"}))
-        result = navirl("extract", log, "-o", "demos.json", "--json")
-        assert json.loads(result.stdout)["trials"][0]["duration_s"] is None
+        result = navirl("extract", log, "--gain", "-o", "demos.json", "--json")
+        (trial,) = json.loads(result.stdout)["trials"]
+        timed = ("duration_s", "contact_share", "impulse_n_s", "direction_rad")
+        assert [trial[name] for name in timed] == [None] * 4
+        assert trial["contacts"] == 1
+        assert trial["peak_force_n"] > 5
         assert "the positions came without times and were laid out at 0.4 m/s" in result.stderr
+        assert "the gain is unknown, because the positions came without times" in result.stderr
+        summary = json.loads(navirl("info", "demos.json", "--json").stdout)
+        assert summary["duration_s"] is None
+        assert "duration" not in navirl("info", "demos.json").stdout
 
     def test_notes_of_several_logs_are_put_together(self, navirl, tmp_path):
         logs = [

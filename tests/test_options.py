@@ -13,13 +13,14 @@ from command_line import options
 import navirl_cli as navirl_python
 from navirl_cli.artefacts.demonstrations import demonstrations_document, settings_document
 from navirl_cli.artefacts.options import NOT_KEPT, option_words
+from navirl_cli.artefacts.steps import extract_words, steps_of
 from navirl_cli.artefacts.store import read_json, write_json
 from navirl_cli.cli import cli
 from navirl_cli.commands.extract import extract
 from navirl_cli.commands.usage import given_words
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.logs.load import LoadOptions
-from navirl_cli.reports.made import Made, extract_words, made_blocks
+from navirl_cli.reports.made import Made, made_blocks
 
 #: A value of every option of extract and fit that is not its default, as words, and as the command line gives it back.
 EXTRACT = {
@@ -189,15 +190,19 @@ def test_both_doors_write_the_options_and_a_report_shows_them(navirl):
     found.write("b.json")
     assert read_json(Path("b.json"), "reward")["options"] == kept
     usual = settings_document(ExtractSettings(), LoadOptions(), None, None)
+    settings = {**usual, "map": "map.yaml", "trials": "t.csv", "wrench": False}
+    inputs = [{"file": name} for name in ("p 1.mcap", "map.yaml", "t.csv")]
     made = Made(
         demos=(SimpleNamespace(file="many/manifest.json"),),
         reward=SimpleNamespace(file="a.json"),
         inputs=[SimpleNamespace(file=name) for name in ("p 1.mcap", "map.yaml", "t.csv")],
-        settings={**usual, "map": "map.yaml", "trials": "t.csv", "wrench": False},
+        settings=settings,
         usual=usual,
         options=("--samples", "5"),
         seed=0,
         everyone=ones,
+        names=["many/"],
+        steps=steps_of(["many/"], [{"inputs": inputs, "settings": settings}]),
     )
     content = {**read_json(Path("a.json"), "reward"), "prior": True}
     lines = [item.strip("`") for item in made_blocks(content, made)[-1].items]

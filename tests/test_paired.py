@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from navirl_cli.evaluation.paired import FEWEST, holm, paired
+from navirl_cli.evaluation.paired import FEWEST, TESTED, corrected, holm, paired
 
 
 def compare(differences, seed=0):
@@ -78,7 +78,7 @@ def test_the_interval_covers_the_mean_about_as_often_as_it_says():
 def test_few_pairs_have_no_interval(count):
     found = compare(np.linspace(0.1, 0.4, count))
     assert np.isfinite(found.bootstrap.lower) == (count >= FEWEST)
-    assert np.isfinite(found.wilcoxon_p)
+    assert np.isfinite(found.wilcoxon_p) == (count >= TESTED)
 
 
 def test_pairs_that_do_not_differ():
@@ -107,3 +107,19 @@ def test_holms_correction_is_its_slow_twin():
         expected[place] = least
     assert holm(p) == pytest.approx(expected, nan_ok=True)
     assert holm(np.array([0.01, 0.04, 0.03])) == pytest.approx([0.03, 0.06, 0.06])
+
+
+def test_comparisons_that_are_no_tests_do_not_count_in_holms_family():
+    rng = np.random.default_rng(6)
+    tests = {f"m{k}": compare(rng.normal(0.8, 0.5, 8)) for k in range(5)}
+    no_tests = {"one": compare([0.4]), "one of five": compare([0.0, 0.3, 0.0, 0.0, 0.0]), "equal": compare(np.zeros(6))}
+    assert np.isnan([one.wilcoxon_p for one in no_tests.values()]).all()
+    alone = corrected([("a", "b", tests)])[0][2]
+    first, second = corrected([("a", "b", {**no_tests, **tests}), ("c", "b", no_tests)])
+    assert {name: first[2][name].holm_p for name in tests} == {name: one.holm_p for name, one in alone.items()}
+    assert np.isnan([found[2][name].holm_p for found in (first, second) for name in no_tests]).all()
+
+
+def test_one_test_beside_comparisons_that_are_none_is_not_corrected():
+    (found,) = corrected([("a", "b", {"test": compare([0.1, 0.2, 0.4]), "one": compare([0.4])})])
+    assert [one.holm_p for one in found[2].values()] == [None, None]

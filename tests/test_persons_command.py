@@ -45,6 +45,8 @@ def test_the_text_says_whose_rewards_these_are_and_that_intervals_are_approximat
     for sentence in (
         "of the typical person",
         "random effects over 3 participants",
+        "Status: converged: another draw moves the typical reward and the scatters by less than",
+        "The demonstrations do not show that people differ: ",
         "Approximate: ",
         "3 participants say little about how people differ.",
         "people differ by %",

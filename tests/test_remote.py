@@ -134,7 +134,6 @@ def clouds(monkeypatch, tmp_path):
         account = {"gcs_base_url": own.url, "disable_oauth": True, "client_email": "", "private_key": "do-not-show"}
         (tmp_path / "account.json").write_text(json.dumps({**account, "private_key_id": ""}))
         for name, value in {
-            "GOOGLE_APPLICATION_CREDENTIALS": tmp_path / "account.json",
             "GOOGLE_SERVICE_ACCOUNT": tmp_path / "account.json",
             "AZURE_STORAGE_USE_EMULATOR": "true",
             "AZURITE_BLOB_STORAGE_URL": own.url,

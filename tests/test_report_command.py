@@ -13,11 +13,12 @@ from click.testing import CliRunner
 from figure_factory import demonstration
 
 from navirl_cli.artefacts.rewards import read_reward
+from navirl_cli.artefacts.steps import selection_words
 from navirl_cli.cli import cli
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings
 from navirl_cli.evaluation.meaning import half_distance_m
-from navirl_cli.reports.made import changed_settings, selection_words
+from navirl_cli.reports.made import changed_settings
 from navirl_cli.reports.reward import in_words
 
 LOGS = sorted((Path(__file__).parent.parent / "sample_logs").glob("*.mcap"))[:1]

@@ -27,6 +27,7 @@ from navirl_cli.artefacts.demonstrations import (
     gain_document,
     settings_document,
 )
+from navirl_cli.artefacts.steps import Origin
 from navirl_cli.demos.contact import PushSettings
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.extract import ExtractSettings
@@ -179,13 +180,16 @@ def _extracted(found: Recordings, said: dict[str, Any], files: Sequence[Path]) -
     demonstrations = found.demonstrations()
     inputs = [*found.inputs, *(Input.of(file) for file in files)]
     warn(found.lost, depth=4)
+    document = demonstrations_document(demonstrations, inputs, said)
+    trials = demonstrations_of(document, "demonstrations")
     return Demonstrations(
-        demonstrations_of(demonstrations_document(demonstrations, inputs, said), "demonstrations"),
+        trials,
         inputs=inputs,
         settings=said,
         notes=[*found.notes(demonstrations), *published_notes(found.extractions)],
         lost=found.lost,
         gain=gain_document([(one.log, one.gain) for one in found.extractions]) if said["gain"] else None,
+        origin=Origin.of({"demos.json": document}, trials),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
+from typing import Any
 
 from navirl_cli.api.arguments import (
     chosen,
@@ -39,6 +40,7 @@ from navirl_cli.irl.terms.term import Term
 from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.fit_remarks import cannot_learn, remarks
 from navirl_cli.reports.fit_remarks import warnings as fit_warnings
+from navirl_cli.reports.persons import ended
 
 
 def fit(
@@ -158,7 +160,7 @@ def fit(
         document |= whose(person, earlier.participants)
     said = remarks(selected.demonstrations, earlier, chosen_by=subset.condition, everyone=demos)
     notes = (*cannot_learn(selected.demonstrations), *said, *reach_unused(document, reach_m), *fit_warnings(document))
-    warn([*_ended(found.status), *lost])
+    warn([*_early(document), *lost])
     return FittedReward.of(
         learnt_of(document, "reward"), document, notes=notes, lost=tuple(lost), fit=found, analyses=analyses
     )
@@ -200,6 +202,7 @@ def _start(
     return starting(terms_in(terms), given, None if earlier is None else earlier.reward)
 
 
-def _ended(status: Status) -> list[str]:
-    """What to say of a fit that is not at a maximum."""
-    return [] if status in {Status.CONVERGED, Status.OPEN_INTERVAL} else [f"fit: {status.value}: {status.advice}"]
+def _early(content: Mapping[str, Any]) -> list[str]:
+    """What to say of a fit that is not at its end."""
+    reached = Status(content["status"]) in {Status.CONVERGED, Status.OPEN_INTERVAL}
+    return [] if reached else [f"fit: {content['status']}: {ended(content)}"]

@@ -6,8 +6,9 @@ from typing import TypeAlias, TypeVar
 
 from navirl_cli.api.results import Demonstrations, FittedReward
 from navirl_cli.artefacts.demonstrations import demonstrations_of
-from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.joined import as_one, read_contents
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
+from navirl_cli.artefacts.steps import Origin, names_of
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import ArgumentError, DemonstrationError
 from navirl_cli.files import Input
@@ -37,7 +38,8 @@ def read_demonstrations(*paths: PathLike) -> Demonstrations:
     files = [Path(path) for path in paths]
     if not files:
         raise ArgumentError("`paths`: expected at least one file, found none")
-    document, _ = read_content(files)
+    contents = read_contents(files)
+    document, _ = as_one(contents)
     trials = demonstrations_of(document, ", ".join(map(str, files)))
     if not trials:
         raise DemonstrationError(f"{', '.join(map(str, files))}: holds no demonstrations")
@@ -49,6 +51,7 @@ def read_demonstrations(*paths: PathLike) -> Demonstrations:
         notes=[f"{one.id}: {note}" for one in trials for note in one.notes],
         gain=document.get("gain"),
         file=Input.of(files[0]) if len(files) == 1 else None,
+        origin=Origin.of(dict(zip(names_of(files), contents.values(), strict=True)), trials),
     )
 
 

@@ -1,6 +1,7 @@
 """Results of the public functions: tables and arrays to print, write, and convert to pandas."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -9,16 +10,18 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from navirl_cli.api.arguments import subset_in
+from navirl_cli.api.frames import frame_of
 from navirl_cli.arrays import FloatArray
 from navirl_cli.artefacts.demonstrations import demonstrations_document
 from navirl_cli.artefacts.persons import of_person
 from navirl_cli.artefacts.rewards import LearntReward, learnt_of
+from navirl_cli.artefacts.steps import Origin
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
 from navirl_cli.documents.tables import ENDINGS, Format
 from navirl_cli.documents.text import to_text
-from navirl_cli.errors import ArgumentError, MissingPackageError, unknown
+from navirl_cli.errors import ArgumentError, unknown
 from navirl_cli.evaluation.compare import Comparison
 from navirl_cli.evaluation.metric import Metric
 from navirl_cli.evaluation.paired import Paired
@@ -37,19 +40,6 @@ from navirl_cli.reports.fit_remarks import warnings
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-
-def frame_of(records: Sequence[Mapping[str, Any]]) -> "DataFrame":
-    """Rows as a pandas DataFrame.
-
-    Raises:
-        MissingPackageError: pandas is not installed.
-    """
-    try:
-        from pandas import DataFrame
-    except ImportError as error:
-        raise MissingPackageError("to_frame needs pandas, found none; install it with: pip install pandas") from error
-    return DataFrame.from_records([dict(record) for record in records])
 
 
 class Demonstrations(Sequence[Demonstration]):
@@ -75,11 +65,12 @@ class Demonstrations(Sequence[Demonstration]):
         lost: Iterable[str] = (),
         gain: Mapping[str, Any] | None = None,
         file: Input | None = None,
+        origin: Origin | None = None,
     ) -> None:
         self._trials = tuple(trials)
         self.inputs, self.settings = tuple(inputs), dict(settings or {})
         self.notes, self.lost, self.gain = tuple(notes), tuple(lost), gain
-        self._file = file
+        self._file, self._origin = file, origin
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -125,8 +116,9 @@ class Demonstrations(Sequence[Demonstration]):
 
     def _with(self, trials: Iterable[Demonstration]) -> "Demonstrations":
         """Some of the trials, with the same sources."""
-        sources = {"inputs": self.inputs, "settings": self.settings, "gain": self.gain, "file": self._file}
-        return Demonstrations(trials, notes=self.notes, lost=self.lost, **sources)  # type: ignore[arg-type]
+        found = copy(self)
+        found._trials = tuple(trials)
+        return found
 
     def sources(self) -> tuple[Input, ...]:
         """The file that the trials were read from, or the logs that they were extracted from."""
@@ -156,6 +148,8 @@ class Demonstrations(Sequence[Demonstration]):
         document = demonstrations_document(self, self.inputs, self.settings)
         if self.gain is not None:
             document["gain"] = dict(self.gain)
+        if self._origin is not None:
+            document = self._origin.recorded(document, self, Path(path).name)
         write_json(Path(path), "demonstrations", document, force=force)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.errors import DemonstrationError
+from navirl_cli.files import Input
 
 
 def some_of(document: Mapping[str, Any], ids: Collection[str]) -> dict[str, Any]:
@@ -81,13 +82,20 @@ def _common(settings: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], list
     return found, notes
 
 
-def relabelled(document: Mapping[str, Any], demonstrations: Sequence[Demonstration]) -> dict[str, Any]:
-    """A demonstrations file's content with the ids and labels of other demonstrations, which are in the same order."""
+def relabelled(document: Mapping[str, Any], demonstrations: Sequence[Demonstration], table: Input) -> dict[str, Any]:
+    """A demonstrations file's content with the ids and labels of other demonstrations, which are in the same order.
+
+    Args:
+        document: As of :func:`some_of`.
+        demonstrations: With the other labels.
+        table: That states them, an input of the new file.
+    """
     found = []
     for entry, one in zip(document["demonstrations"], demonstrations, strict=True):
         labels = {"id": one.id, "participant": one.participant, "condition": one.condition.value}
         found.append({**entry, **labels, "cycle": one.cycle, "set": one.set})
-    return {**plain(document), "demonstrations": found}
+    inputs = [*document["inputs"], *([] if vars(table) in document["inputs"] else [vars(table)])]
+    return {**plain(document), "inputs": inputs, "demonstrations": found}
 
 
 def plain(document: Mapping[str, Any]) -> dict[str, Any]:

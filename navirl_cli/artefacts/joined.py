@@ -1,7 +1,7 @@
 """Several files and folders of demonstrations as one."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,16 +42,36 @@ def read_content(paths: Sequence[Path]) -> tuple[dict[str, Any], list[str]]:
         The content, and what of several files does not fit together (:func:`~navirl_cli.artefacts.editing.merged`).
 
     Raises:
+        NavirlError: As :func:`read_contents`, and two trials have the same id.
+    """
+    return as_one(read_contents(paths))
+
+
+def as_one(contents: Mapping[Path, Mapping[str, Any]]) -> tuple[dict[str, Any], list[str]]:
+    """The contents of several files as that of one, and what does not fit together.
+
+    Raises:
+        DemonstrationError: Two trials have the same id.
+    """
+    if len(contents) == 1:
+        return dict(next(iter(contents.values()))), []
+    content, notes = merged({str(path): one for path, one in contents.items()})
+    return _FORMAT | content, notes
+
+
+def read_contents(paths: Sequence[Path]) -> dict[Path, dict[str, Any]]:
+    """The contents of demonstrations files, and of folders with a manifest, in their order.
+
+    Args:
+        paths: At least one.
+
+    Raises:
         ArgumentError: A path is named twice.
         ArtefactError: As in :func:`~navirl_cli.artefacts.store.read_json`.
         DemonstrationError: Two trials have the same id.
     """
     _refuse_same(paths)
-    contents = {str(path): _content(path) for path in paths}
-    if len(paths) == 1:
-        return contents[str(paths[0])], []
-    content, notes = merged(contents)
-    return _FORMAT | content, notes
+    return {path: _content(path) for path in paths}
 
 
 def _content(path: Path) -> dict[str, Any]:

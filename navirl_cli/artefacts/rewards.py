@@ -102,12 +102,12 @@ class LearntReward(ByContent):
             raise RewardError(
                 "`prior`: expected one reward, found one for each person; say whose reward to learn with `person`"
             )
+        if self.others is not None:  # integrated over, so that there is no maximum to reach
+            return self.others.prior()
         if self.status in {Status.STOPPED_EARLY, Status.INFINITE}:
             raise RewardError(
                 f"`prior`: expected a fit at its maximum, found one that ended with {self.status.value}; fit it again"
             )
-        if self.others is not None:
-            return self.others.prior()
         return Prior.gaussian(np.array(self.reward.theta), self.covariance)
 
 

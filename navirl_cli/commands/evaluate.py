@@ -206,7 +206,8 @@ def evaluate(
     """Measure demonstrated, learnt and baseline paths, and compare groups of them.
 
     Several files of demonstrations stand in one table, and groups of the same name are compared by participant; so are
-    the learnt paths of several rewards. With several tests, p-values are also given by Holm's method.
+    the learnt paths of several rewards. With several tests, p-values are also given by Holm's method. Fewer than
+    two participants who differ are no test.
 
     Each metric has a mean and a standard deviation by group: over demonstrations for driven paths, over the policy for
     learnt paths. Distances are from the robot's shell to people's centres. Expected visits of the policy give exact

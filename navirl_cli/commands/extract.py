@@ -1,14 +1,13 @@
 """``navirl extract``: logs to demonstrations."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, gain_document, settings_document
-from navirl_cli.artefacts.manifest import Entry
 from navirl_cli.artefacts.many import Folder, check_some
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.cluster import workers_of
@@ -36,9 +35,9 @@ from navirl_cli.commands.usage import Command, Example, section
 from navirl_cli.demos.contact import CUTOFF_HZ, PushSettings
 from navirl_cli.demos.demonstration import Condition
 from navirl_cli.demos.extract import ExtractSettings
-from navirl_cli.demos.labels import read_labels
+from navirl_cli.demos.labels import Labels, read_labels
 from navirl_cli.demos.rasterize import Rule
-from navirl_cli.demos.recordings import Recordings, check_no_wrench, extract_recordings
+from navirl_cli.demos.recordings import check_no_wrench, extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.text import to_text
 from navirl_cli.files import Input
@@ -249,33 +248,42 @@ def extract(
     )
     labels = None if trials is None else read_labels(trials)
     said = settings_document(settings, options, map_file, trials, join=join)
-    if output.is_folder:
-        folder = Folder(output.path, settings, options, said, list(map(Input.of, files)))
-        with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
-            entries = folder.extract(logs, labels=labels, join=join, force=force, executor=executor, progress=update)
-        _report_folder(folder, entries, as_json=as_json)
-        return
-    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
-        found = extract_recordings(
-            logs, settings, options, join=join, labels=labels, executor=executor, progress=update
-        )
-    _write(found, output.path, list(map(Input.of, files)), said, gain=gain, as_json=as_json, force=force)
+    asked = _Asked(logs, settings, options, labels, join, said, list(map(Input.of, files)))
+    into = _into_folder if output.is_folder else _into_file
+    into(asked, output.path, workers, cluster, as_json=as_json, force=force)
 
 
-def _write(
-    found: Recordings,
-    path: Path,
-    files: Sequence[Input],
-    said: dict[str, Any],
-    *,
-    gain: bool,
-    as_json: bool,
-    force: bool,
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is extracted, and how."""
+
+    logs: Sequence[Path]
+    settings: ExtractSettings
+    options: LoadOptions
+    labels: Labels | None
+    join: bool
+    #: The settings as a file holds them, and the other files that were read.
+    said: dict[str, Any]
+    files: Sequence[Input]
+
+
+def _into_file(
+    asked: _Asked, path: Path, workers: int | None, cluster: str | None, *, as_json: bool, force: bool
 ) -> None:
     """Write the demonstrations of all logs to one file, and say what they are."""
+    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+        found = extract_recordings(
+            asked.logs,
+            asked.settings,
+            asked.options,
+            join=asked.join,
+            labels=asked.labels,
+            executor=executor,
+            progress=update,
+        )
     demonstrations = found.demonstrations()
-    document = demonstrations_document(demonstrations, [*found.inputs, *files], said)
-    if gain:
+    document = demonstrations_document(demonstrations, [*found.inputs, *asked.files], asked.said)
+    if asked.settings.gain:
         document["gain"] = gain_document([(result.log, result.gain) for result in found.extractions])
     write_json(path, "demonstrations", document, force=force)
     table, gains = trial_table(demonstrations), document.get("gain")
@@ -288,8 +296,15 @@ def _write(
     finish(found.lost)
 
 
-def _report_folder(folder: Folder, entries: Sequence[Entry], *, as_json: bool) -> None:
-    """What became of many logs."""
+def _into_folder(
+    asked: _Asked, path: Path, workers: int | None, cluster: str | None, *, as_json: bool, force: bool
+) -> None:
+    """Write a file a log to a folder, and say what became of the logs."""
+    folder = Folder(path, asked.settings, asked.options, asked.said, asked.files)
+    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+        entries = folder.extract(
+            asked.logs, labels=asked.labels, join=asked.join, force=force, executor=executor, progress=update
+        )
     check_some(entries)
     if as_json:
         echo_json({"logs": [asdict(one) for one in entries], "unchanged": folder.unchanged})

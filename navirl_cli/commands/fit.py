@@ -177,12 +177,8 @@ def fit(
     kind = None if intervals is None else Kind(intervals)
     questions = Questions(correct_bias, bootstrap, profiles, bool(cross_validate), seed, kind, Pool(pool), person)
     questions.check_arguments(Steps(steps), prior=prior_file is not None, l2=l2)
-    named = [Path(initial)] if initial and "=" not in initial else []
-    files = [*demos, *named, *([prior_file] if prior_file else [])]
+    files, given = _before_work(demos, initial, prior_file, terms)
     check_output(output, files, force=force)
-    given = _given(initial)
-    if prior_file is None:
-        _start(terms, given)  # refuses wrong words before the work
     everyone = demonstrations_in(*demos)
     selected = select(
         of_participant(everyone, person),
@@ -238,6 +234,17 @@ def _learn(evidence: Evidence, start: Reward, prior: Prior | None, l2: float, me
             method=method,
             progress=lambda step, value: update(step, f"log-likelihood {value:.3f}"),
         )
+
+
+def _before_work(
+    demos: Sequence[Path], initial: str, prior_file: Path | None, terms: Sequence[Term]
+) -> tuple[list[Path], Reward | dict[str, float] | None]:
+    """The input files and the initial parameters of --init, of which wrong words are refused before the work."""
+    given = _given(initial)
+    if prior_file is None:
+        _start(terms, given)
+    named = [Path(initial)] if initial and "=" not in initial else []
+    return [*demos, *named, *([prior_file] if prior_file else [])], given
 
 
 def _given(initial: str) -> Reward | dict[str, float] | None:

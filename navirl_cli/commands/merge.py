@@ -5,8 +5,9 @@ from pathlib import Path
 import click
 
 from navirl_cli.artefacts.editing import plain
-from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.joined import as_one, read_contents
 from navirl_cli.artefacts.manifest import manifest_path
+from navirl_cli.artefacts.steps import edited
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
 from navirl_cli.commands.usage import Command, Example, section
@@ -31,8 +32,9 @@ def merge(demos: tuple[Path, ...], output: Path, force: bool) -> None:
     if len(demos) == 1 and manifest_path(demos[0]).name != MANIFEST:
         raise click.UsageError("merge needs two or more files, or a folder.")
     check_output(output, demos, force=force)
-    content, notes = read_content(demos)
-    write_json(output, "demonstrations", plain(content), force=force)
+    contents = read_contents(demos)
+    content, notes = as_one(contents)
+    write_json(output, "demonstrations", edited(plain(content), "merge", contents, (), output), force=force)
     people = {one["participant"] for one in content["demonstrations"]}
     count = len(people)
     echo(f"{output}: {counted(len(content['demonstrations']), 'demonstration')} of {counted(count, 'participant')}")

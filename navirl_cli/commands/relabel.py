@@ -6,14 +6,16 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
 from navirl_cli.artefacts.editing import relabelled as relabelled_content
-from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.joined import as_one, read_contents
+from navirl_cli.artefacts.steps import edited
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
 from navirl_cli.commands.types import FilePath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, given_words, section
 from navirl_cli.demos.labels import read_labels
 from navirl_cli.demos.relabelling import relabelled
 from navirl_cli.errors import Number, counted
+from navirl_cli.files import Input
 
 
 @click.command(
@@ -42,10 +44,12 @@ def relabel(demos: tuple[Path, ...], trials: Path, output: Path, force: bool) ->
     or paths: for these, extract again with the table.
     """
     check_output(output, [*demos, trials], force=force)
-    document, unlike = read_content(demos)
+    contents = read_contents(demos)
+    document, unlike = as_one(contents)
     before = demonstrations_of(document, ", ".join(map(str, demos)))
     after, notes = relabelled(before, read_labels(trials))
-    write_json(output, "demonstrations", relabelled_content(document, after), force=force)
+    content = relabelled_content(document, after, Input.of(trials))
+    write_json(output, "demonstrations", edited(content, "relabel", contents, given_words(), output), force=force)
     changed = sum(_labels(old) != _labels(new) for old, new in zip(before, after, strict=True))
     echo(f"{output}: {changed} of {counted(len(after), 'demonstration')} {Number(changed):has|have} other labels")
     for line in (*unlike, *notes):

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from navirl_cli.artefacts.demonstrations import settings_document
-from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.joined import as_one, read_contents
 from navirl_cli.artefacts.rewards import LearntReward, check_cells, learnt_of, reward_content
+from navirl_cli.artefacts.steps import names_of, steps_of
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import (
     check_output,
@@ -121,7 +122,8 @@ def _made(demos: Sequence[Path], reward: Path, everyone: Sequence[Demonstration]
     """The files of the page, and the options by which they were made."""
     from navirl_cli.reports.made import Made
 
-    extracted, _ = read_content(demos)
+    contents, names = read_contents(demos), names_of(demos)
+    extracted, _ = as_one(contents)
     return Made(
         demos=tuple(map(Input.of, demos)),
         reward=Input.of(reward),
@@ -131,6 +133,8 @@ def _made(demos: Sequence[Path], reward: Path, everyone: Sequence[Demonstration]
         options=tuple(given_words()),
         seed=seed,
         everyone=everyone,
+        names=names,
+        steps=steps_of(names, contents.values()),
     )
 
 

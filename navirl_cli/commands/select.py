@@ -6,11 +6,12 @@ import click
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
 from navirl_cli.artefacts.editing import some_of
-from navirl_cli.artefacts.joined import read_content
+from navirl_cli.artefacts.joined import as_one, read_contents
+from navirl_cli.artefacts.steps import edited
 from navirl_cli.artefacts.store import write_json
 from navirl_cli.commands.choosing import Choosing, choice_options
 from navirl_cli.commands.shared import check_output, demos_argument, echo, force_option, output_option, say
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, given_words, section
 from navirl_cli.errors import counted
 
 
@@ -32,10 +33,12 @@ def select(demos: tuple[Path, ...], choosing: Choosing, output: Path, force: boo
     if not choosing.subset.names:
         raise click.UsageError("Name what to select: --condition, --cycle, --set, --participant or --trial.")
     check_output(output, demos, force=force)
-    document, notes = read_content(demos)
+    contents = read_contents(demos)
+    document, notes = as_one(contents)
     everyone = demonstrations_of(document, ", ".join(map(str, demos)))
     chosen = choosing.of(everyone)
-    write_json(output, "demonstrations", some_of(document, {one.id for one in chosen}), force=force)
+    content = some_of(document, {one.id for one in chosen})
+    write_json(output, "demonstrations", edited(content, "select", contents, given_words(), output), force=force)
     echo(f"{output}: {len(chosen)} of {counted(len(everyone), 'demonstration')}")
     for line in notes:
         say(line)

@@ -103,11 +103,8 @@ def study(
     """
     from navirl_cli.artefacts.study import study_document
     from navirl_cli.figures.study import draw_study
-    from navirl_cli.irl.reward import PAPER_TERMS
     from navirl_cli.irl.terms.registry import names_of
     from navirl_cli.reports.study import FIGURES, StudyContext, overview_of, remarks
-    from navirl_cli.study.learning import people_of
-    from navirl_cli.study.pipeline import study_of
     from navirl_cli.study.questionnaire import read_answers, shares
     from navirl_cli.study.unseen import pooled_policy
 
@@ -118,17 +115,7 @@ def study(
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
         demonstrations = given.demonstrations
-        with progress_bar("fit", len(people_of(demonstrations)) + 1, line_every=1) as update:
-            found = study_of(
-                demonstrations,
-                given.completion_s,
-                samples,
-                seed,
-                terms=terms or PAPER_TERMS,
-                published=given.published,
-                progress=update,
-                executor=executor,
-            )
+        found = _fitted(given, samples, seed, terms, executor)
         inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
         settings = {"samples": samples, "seed": seed, "levels": levels, "terms": names_of(found.terms)}
         numbers = study_document(found, given.cells, bars)
@@ -196,6 +183,25 @@ def _given(logs: Sequence[Path], options: LoadOptions, executor: Executor) -> _G
         found.notes(demonstrations),
         found.lost,
     )
+
+
+def _fitted(given: _Given, samples: int, seed: int, terms: tuple["Term", ...], executor: Executor) -> "Study":
+    """The study's rewards and numbers, with a progress bar."""
+    from navirl_cli.irl.reward import PAPER_TERMS
+    from navirl_cli.study.learning import people_of
+    from navirl_cli.study.pipeline import study_of
+
+    with progress_bar("fit", len(people_of(given.demonstrations)) + 1, line_every=1) as update:
+        return study_of(
+            given.demonstrations,
+            given.completion_s,
+            samples,
+            seed,
+            terms=terms or PAPER_TERMS,
+            published=given.published,
+            progress=update,
+            executor=executor,
+        )
 
 
 def _holds_demonstrations(path: Path) -> bool:

@@ -102,8 +102,8 @@ def recording_notes(recording: Recording, pushes: Pushes | None, push: PushSetti
     notes = ["contact is unknown: no wrench was read"] if pushes is None else _wrench_notes(pushes, push)
     if recording.session.laid_out_m_s is not None:
         notes.append(
-            f"the positions came without times and were laid out at {recording.session.laid_out_m_s:g} m/s: durations "
-            "and speeds are not measured"
+            f"the positions came without times and were laid out at {recording.session.laid_out_m_s:g} m/s: durations, "
+            "speeds and impulses are not measured"
         )
     if is_costmap(recording.occupancy.data):
         notes.append("the map is a costmap that is inflated already (cells of 99); `robot_radius` does not grow it")

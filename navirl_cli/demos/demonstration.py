@@ -173,6 +173,11 @@ class Demonstration(ByContent):
         return float(self.t_s[-1] - self.t_s[0])
 
     @property
+    def timed(self) -> bool:
+        """Whether its times were measured: what rests on times that were laid out is not known."""
+        return self.laid_out_m_s is None
+
+    @property
     def contact_s(self) -> float | None:
         """Time in contact, s; None where it is unknown."""
         return None if self.contacts is None else sum(contact.duration_s for contact in self.contacts)

@@ -130,9 +130,8 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         *row_notes(recording, trials, labels, own),
         *guess_notes(recording, own.values()),
     ]
-    gain = gain_of(recording, pushes, found, settings.push.begins_n) if settings.gain and pushes else None
-    if settings.gain and gain is None:
-        notes.append(f"{recording.log}: the gain is unknown, because no trial holds a push to the side")
+    gain, unknown = _gain(recording, pushes, found, settings)
+    notes += [f"{recording.log}: {unknown}"] if unknown else []
     # where and what stands in the log's own damage, whose paths mean nothing elsewhere
     lost = ["data of its log is lost, as extract lists"] if recording.damage else []
     warnings = (*lost, *(line.removeprefix(f"{recording.log}: ") for line in notes))
@@ -147,6 +146,18 @@ def extract(recording: Recording, settings: ExtractSettings, labels: Sequence[La
         published=_published(recording, trials, found),
         completion_s=recording.session.completion_s,
     )
+
+
+def _gain(
+    recording: Recording, pushes: Pushes | None, found: Sequence[Demonstration], settings: ExtractSettings
+) -> tuple[Gain | None, str]:
+    """The gain where it is asked for, and why it is unknown."""
+    if not settings.gain:
+        return None, ""
+    if recording.session.laid_out_m_s is not None:
+        return None, "the gain is unknown, because the positions came without times"
+    gain = None if pushes is None else gain_of(recording, pushes, found, settings.push.begins_n)
+    return gain, "" if gain else "the gain is unknown, because no trial holds a push to the side"
 
 
 def _nothing(recording: Recording, reasons: Sequence[str], errors: Sequence[NavirlError]) -> NavirlError:

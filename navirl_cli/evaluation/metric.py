@@ -45,7 +45,7 @@ def missing_of(demonstration: Demonstration) -> frozenset[Need]:
     """What a demonstration lacks."""
     found = {
         Need.PEOPLE: len(demonstration.people_m) > 0,
-        Need.TIMES: demonstration.laid_out_m_s is None,
+        Need.TIMES: demonstration.timed,
         Need.WRENCH: demonstration.contacts is not None and demonstration.force_n is not None,
     }
     return frozenset(need for need, there in found.items() if not there)

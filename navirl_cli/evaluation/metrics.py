@@ -247,7 +247,7 @@ METRICS: tuple[Metric, ...] = (
         "contact",
         "1",
         "share of the time in contact",
-        needs=(Need.WRENCH,),
+        needs=(Need.WRENCH, Need.TIMES),
         drive=lambda drive: drive.contact_share,
     ),
     Metric(
@@ -262,8 +262,8 @@ METRICS: tuple[Metric, ...] = (
         "impulse_n_s",
         "impulse",
         "N s",
-        "sum over the contacts of the magnitude of the force's integral",
-        needs=(Need.WRENCH,),
+        "sum over the contacts of the magnitude of the force's integral over time",
+        needs=(Need.WRENCH, Need.TIMES),
         drive=lambda drive: drive.impulse_n_s,
     ),
     Metric(

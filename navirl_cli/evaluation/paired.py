@@ -17,6 +17,8 @@ from navirl_cli.evaluation.metric import Metric
 RESAMPLES = 9999
 #: Fewer pairs have no bootstrap interval: their resampled means take only a handful of values.
 FEWEST = 4
+#: Fewer pairs that differ are no test: by whatever sign of one difference, its p-value is 1.
+TESTED = 2
 
 
 class Interval(NamedTuple):
@@ -39,7 +41,7 @@ class Paired(ByContent):
     #: Bootstrap interval of the mean (bias-corrected and accelerated); NaN below FEWEST pairs, None where it was not
     #: asked for.
     bootstrap: Interval | None = None
-    #: wilcoxon_p corrected for all tests of the same table of results; None for one test alone.
+    #: wilcoxon_p corrected for all tests of the same table of results; None for one test alone, NaN without a test.
     holm_p: float | None = None
 
     @property
@@ -66,13 +68,15 @@ class Paired(ByContent):
 
     @cached_property
     def wilcoxon_p(self) -> float:
-        """Two-sided p-value of Wilcoxon's signed-rank test of the pairs that differ; NaN if none differs.
+        """Two-sided p-value of Wilcoxon's signed-rank test of the pairs that differ; NaN if fewer than two differ.
 
         Exact for up to 50 pairs without ties.
         """
+        if len(self._differing) < TESTED:
+            return float("nan")
         from scipy.stats import wilcoxon
 
-        return float(wilcoxon(self._differing).pvalue) if len(self._differing) else float("nan")
+        return float(wilcoxon(self._differing).pvalue)
 
     @cached_property
     def rank_biserial(self) -> float:
@@ -192,16 +196,20 @@ def pairs_of_all(
             for other in others:
                 own = _of_paths((rows, other), (rows, one), of_learnt, rng)
                 found.append((f"{group}: {other}", one, own))
-    return _corrected(found)
+    return corrected(found)
 
 
-def _corrected(pairs: Sequence[tuple[str, str, dict[str, Paired]]]) -> list[tuple[str, str, dict[str, Paired]]]:
-    """The same with p-values by Holm's method over all tests, where there are several."""
-    tests = [(number, name) for number, (_, _, own) in enumerate(pairs) for name in own]
-    if len(tests) < 2:
+def corrected(pairs: Sequence[tuple[str, str, dict[str, Paired]]]) -> list[tuple[str, str, dict[str, Paired]]]:
+    """The same with p-values by Holm's method over all tests, where there are several.
+
+    A comparison with fewer than TESTED differences is no test and does not count. That depends on the sizes of the
+    differences alone, not on their signs, which are what Wilcoxon's test takes as random.
+    """
+    keys = [(number, name) for number, (_, _, own) in enumerate(pairs) for name in own]
+    p_values = np.array([pairs[number][2][name].wilcoxon_p for number, name in keys])
+    if np.isfinite(p_values).sum() < 2:
         return list(pairs)
-    adjusted = holm(np.array([pairs[number][2][name].wilcoxon_p for number, name in tests]))
-    by_test = dict(zip(tests, adjusted, strict=True))
+    by_test = dict(zip(keys, holm(p_values), strict=True))
     return [
         (one, other, {name: replace(pair, holm_p=float(by_test[number, name])) for name, pair in own.items()})
         for number, (one, other, own) in enumerate(pairs)

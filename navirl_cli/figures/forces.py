@@ -162,7 +162,7 @@ def _over_time(axes: Axes, one: Demonstration, force_n: FloatArray) -> list[Line
     axes.set_xlim(one.t_s[0], one.t_s[-1])
     low, high = axes.get_ylim()
     axes.set_ylim(min(low, -_LEAST_N / 5), max(high, _LEAST_N))
-    axes.set_xlabel("time since start of trial [s]")
+    axes.set_xlabel("time since start of trial [s]" if one.timed else f"time, laid out at {one.laid_out_m_s:g} m/s [s]")
     axes.set_ylabel("force [N]")
     axes.set_box_aspect(_aspect(axes))
     return lines
@@ -192,17 +192,19 @@ def _name_contacts(axes: Axes, one: Demonstration) -> list[Annotation]:
     axes.set_ylim(low, high + len(ends) * row_n)
     style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6.5, "linespacing": 1.0}
     return [
-        axes.annotate(_numbers(contact), (at, high + row * row_n), **style)
+        axes.annotate(_numbers(contact, timed=one.timed), (at, high + row * row_n), **style)
         for contact, (at, row) in zip(contacts, places, strict=True)
     ]
 
 
-def _numbers(contact: Contact) -> str:
-    """Peak force and impulse as text."""
-    return f"{contact.peak_force_n:.1f} N\n{np.hypot(*contact.impulse_n_s):.1f} N s"
+def _numbers(contact: Contact, *, timed: bool) -> str:
+    """Peak force and impulse as text; no impulse where times were not measured."""
+    impulse = f"\n{np.hypot(*contact.impulse_n_s):.1f} N s" if timed else ""
+    return f"{contact.peak_force_n:.1f} N{impulse}"
 
 
 def _contact_handles(one: Demonstration) -> list[Patch]:
     """Legend entry of contacts; none without contact."""
     look_of: dict[str, Any] = {"facecolor": colour_of(group_of(one)), "alpha": _OPACITY, "linewidth": 0}
-    return [Patch(label="contact (peak, impulse)", **look_of)] if one.contacts else []
+    label = "contact (peak, impulse)" if one.timed else "contact (peak)"
+    return [Patch(label=label, **look_of)] if one.contacts else []

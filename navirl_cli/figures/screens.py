@@ -13,6 +13,8 @@ from navirl_cli.figures.style import COLUMN_IN, DPI, PAGE_IN, styled
 
 #: Draws a figure of a width, inches, in the current look; and says whether to remove its empty height.
 Draw: TypeAlias = Callable[[float], tuple[Figure, bool]]
+#: Resolution of figures for narrow screens, dots per inch: with 2 dots a pixel, 394 pixels wide, as wide as phones are.
+NARROW_DPI = 225
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,14 @@ def save_for_screens(
     """
     files = {}
     for ending, width_in in drawing.widths_in.items():
-        with styled("paper"):
+        dpi = NARROW_DPI if ending else DPI
+        with styled("paper", dpi=dpi):
             light, trim = drawing.draw(width_in)
             settle(light, trim=trim)
             files[name + ending] = (page or folder if ending else folder) / f"{name}{ending}.png"
             for extension in ("png",) if ending else formats:
                 save_figure(light, files[name + ending].with_suffix(f".{extension}"), force=force, trim=False)
-        with styled("dark", dpi=DPI):
+        with styled("dark", dpi=dpi):
             dark, _ = drawing.draw(width_in)
             settle_like(dark, light)
             files[f"{name}{ending}_dark"] = (page or folder) / f"{name}{ending}_dark.png"

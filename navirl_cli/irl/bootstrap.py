@@ -19,6 +19,8 @@ from navirl_cli.parallel import map_in_order
 
 #: Replicates that one process computes between two reports of progress.
 BATCH = 5
+#: With fewer participants, every replicate looks for other maxima.
+SCANNED = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,14 +125,14 @@ def bootstrap(
     member = np.array([[name == participant for participant in evidence.participants] for name in names], dtype=int)
     batches = np.array_split(drawn @ member, max(1, -(-count // BATCH)))
     results: list[Fit | None] = []
-    for batch in map_in_order(partial(_refit, evidence, found), batches, executor):
+    # few draws differ much from all together: their maximum may be another one
+    refit = partial(_refit, evidence, found, len(names) < SCANNED)
+    for batch in map_in_order(refit, batches, executor):
         results.extend(batch)
         if progress is not None:
             progress(len(results), "")
     alone = [
-        result
-        for batch in map_in_order(partial(_refit, evidence, found), np.array_split(1 - member, len(member)), executor)
-        for result in batch
+        result for batch in map_in_order(refit, np.array_split(1 - member, len(member)), executor) for result in batch
     ]
     fits = [result for result in results if result is not None]
     if len(fits) < 2:
@@ -154,8 +156,8 @@ def _theta(again: Fit | None, count: int) -> FloatArray:
     return np.where(again.identified, again.reward.theta, np.nan)
 
 
-def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
-    """Fits for rows of counts by demonstration."""
+def _refit(evidence: Evidence, found: Fit, scan: bool, batch: IntArray) -> list[Fit | None]:
+    """Fits for rows of counts by demonstration, with a search for other maxima or without."""
     results: list[Fit | None] = []
     for counts in batch:
         try:
@@ -165,7 +167,7 @@ def _refit(evidence: Evidence, found: Fit, batch: IntArray) -> list[Fit | None]:
                 found.l2,
                 prior=found.prior,
                 method=found.method,
-                scan=False,
+                scan=scan,
             )
         except (InfinitePartitionError, DemonstrationError):
             results.append(None)

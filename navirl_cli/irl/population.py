@@ -197,7 +197,7 @@ def _typical(evidence: Evidence, pooled: Fit, found: RandomEffects, result: Popu
     value = log_likelihood(evidence, reward)
     prior = Prior.l2(reward.parameters, pooled.l2)
     status = pooled.status
-    if status not in {Status.NOT_IDENTIFIED, Status.ON_BOUND}:
+    if status in {Status.CONVERGED, Status.OPEN_INTERVAL}:
         status = Status.CONVERGED if found.converged else Status.STOPPED_EARLY
     return replace(
         pooled,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.spread import Factors, Posterior, Spread
 
 #: A covariance corrected by the Gaussian stand-in is taken where its least variance is above this share of the smaller
@@ -13,7 +13,7 @@ DEFINITE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled(ByContent):
+class Sampled:
     """People's likelihoods at places that do not depend on the spread.
 
     The error that the same places make with a Gaussian stand-in, whose moments are known, is subtracted (control

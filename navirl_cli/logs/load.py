@@ -160,22 +160,9 @@ def follow(
     read = read_tables(log, files, chosen, progress)
     nothing = undefined(log, topics)
     refusals += [nothing] if nothing else read.refusals
-    timed = placed = None
-    try:
-        timed = on_one_clock(log, read.tables, options.time)
-        placed = in_one_frame(
-            log,
-            timed.tables,
-            options.frame,
-            options.wrench_frame,
-            options.occupancy,
-            options.force_scale,
-            options.namespace,
-        )
-        refusals += placed.refusals
-    except NavirlError as error:
-        # without a clock nothing goes on; why there is none is known where a topic is missing or unread
-        refusals += [] if refusals else [error]
+    timed, placed, stopped = _related(log, read.tables, options)
+    # without a clock nothing goes on; why there is none is known where a topic is missing or unread
+    refusals += placed.refusals if placed else [] if refusals or stopped is None else [stopped]
     foreign = {topic.name: None for choice in chosen.values() for topic in choice.foreign}
     refusals = [_with_foreign(one, tuple(foreign)) for one in refusals]
     findings = (
@@ -194,6 +181,25 @@ def follow(
         return replace(line, recording=None if refusals else _recording(log, timed, placed, session, lost, notes))
     except NavirlError as error:
         return replace(line, refusals=(*refusals, error))
+
+
+def _related(log: str, tables: Tables, options: LoadOptions) -> tuple[Timed | None, Placed | None, NavirlError | None]:
+    """The stages of time and of space, and why one of them stopped; None for a stage that was not passed."""
+    timed = None
+    try:
+        timed = on_one_clock(log, tables, options.time)
+        placed = in_one_frame(
+            log,
+            timed.tables,
+            options.frame,
+            options.wrench_frame,
+            options.occupancy,
+            options.force_scale,
+            options.namespace,
+        )
+    except NavirlError as error:
+        return timed, None, error
+    return timed, placed, None
 
 
 def _found(timed: Timed | None, placed: Placed | None) -> Findings:

@@ -14,7 +14,7 @@ from navirl_cli.evaluation.compare import DRIVEN, LEARNT, PATH_TYPES, Comparison
 from navirl_cli.evaluation.groups import GroupMetrics, quantiles_of
 from navirl_cli.evaluation.metric import Metric
 from navirl_cli.evaluation.metrics import METRICS
-from navirl_cli.evaluation.paired import FEWEST, Paired
+from navirl_cli.evaluation.paired import FEWEST, TESTED, Paired
 from navirl_cli.evaluation.ranks import Ranking
 from navirl_cli.files import replacing
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
@@ -236,7 +236,7 @@ def _numbers(result: Comparison, metrics: Sequence[Metric]) -> Table:
 
 def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence[Metric]) -> Table:
     """Differences by metric."""
-    corrected = any(pair.holm_p is not None for pair in found.values())
+    several = any(pair.holm_p is not None for pair in found.values())
     columns = (
         Column("metric"),
         Column("mean_difference", "mean difference", DECIMALS, sign=True),
@@ -244,7 +244,7 @@ def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence
         Column("bootstrap_interval", "95 % interval (bootstrap)", DECIMALS, sign=True),
         Column("n"),
         Column("wilcoxon_p", "p (Wilcoxon)", 4),
-        *([Column("holm_p", "p (Holm)", 4)] if corrected else []),
+        *([Column("holm_p", "p (Holm)", 4)] if several else []),
         Column("cohen_dz", "Cohen's d_z", 2),
         Column("rank_biserial", "rank-biserial r", 2),
     )
@@ -257,7 +257,7 @@ def _paired(one: str, other: str, found: Mapping[str, Paired], metrics: Sequence
             None if pair.bootstrap is None else Interval(*pair.bootstrap),
             pair.n,
             pair.wilcoxon_p,
-            *([pair.holm_p] if corrected else []),
+            *([pair.holm_p] if several else []),
             pair.cohen_dz,
             pair.rank_biserial,
         )
@@ -275,10 +275,13 @@ def _paired_note(known: Sequence[tuple[Metric, Paired]], metrics: Sequence[Metri
     notes = []
     if any(pair.holm_p is not None for pair in pairs):
         notes.append("p (Holm) is corrected for all tests of these tables.")
+    differing = [sum(value != 0 for value in pair.differences.values()) for pair in pairs]
     if any(pair.n < FEWEST for pair in pairs):
         notes.append(f"A bootstrap interval needs {FEWEST} participants, Student's interval 2.")
-    if any(not isfinite(pair.wilcoxon_p) for pair in pairs):
-        notes.append("Without a difference there is no test and no effect size.")
+    if any(count < TESTED for count in differing):
+        notes.append(f"Wilcoxon's test needs {TESTED} participants who differ; other rows do not count as tests.")
+    if not all(differing):
+        notes.append("Without a difference there is no effect size.")
     elif any(not isfinite(pair.cohen_dz) for pair in pairs):
         notes.append("Cohen's d_z needs 2 participants whose differences differ.")
     if lacking:

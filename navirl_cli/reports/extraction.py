@@ -42,8 +42,8 @@ _LOG = (Column("log"), Column("status"), Column("trials"), Column("demonstration
 def trial_table(demonstrations: Sequence[Demonstration]) -> Table:
     """One row for each trial. The direction is that of the contact with the largest impulse."""
     notes = []
-    if any(one.laid_out_m_s is not None for one in demonstrations):
-        notes.append("Duration is missing: positions came without times.")
+    if not all(one.timed for one in demonstrations):
+        notes.append("What rests on time is missing: positions came without times.")
     if any(one.contacts is None for one in demonstrations):
         notes.append("Contacts are unknown: forces were not read.")
     return Table(_TRIAL, tuple(map(_trial, demonstrations)), note=" ".join(notes))
@@ -52,19 +52,21 @@ def trial_table(demonstrations: Sequence[Demonstration]) -> Table:
 def _trial(d: Demonstration) -> tuple[Cell, ...]:
     """A row of the table of trials."""
     contacts = d.contacts or ()
-    strongest = max(contacts, key=lambda contact: hypot(*contact.impulse_n_s), default=None)
+    # by the impulse, of which shares of time, sums over time and directions are not known without times
+    known = contacts if d.timed else ()
+    strongest = max(known, key=lambda contact: hypot(*contact.impulse_n_s), default=None)
     return (
         d.id,
         d.condition.value,
         d.cycle,
         d.set,
-        None if d.laid_out_m_s is not None else d.duration_s,
+        d.duration_s if d.timed else None,
         path_length_m(d.xy_m),
         len(d.cells),
         None if d.contacts is None else len(d.contacts),
-        None if d.contact_s is None else d.contact_s / d.duration_s,
+        d.contact_s / d.duration_s if d.timed and d.contact_s is not None else None,
         max((contact.peak_force_n for contact in contacts), default=None),
-        None if d.contacts is None else sum(hypot(*contact.impulse_n_s) for contact in contacts),
+        sum(hypot(*contact.impulse_n_s) for contact in contacts) if d.timed and d.contacts is not None else None,
         None if strongest is None else strongest.direction_rad,
     )
 

@@ -20,7 +20,7 @@ from navirl_cli.irl.terms.term import Parameter, Term
 from navirl_cli.irl.uncertainty import condition_number, correlation
 from navirl_cli.reports.evidence import reach_line
 from navirl_cli.reports.fit_remarks import FEW
-from navirl_cli.reports.persons import person_blocks
+from navirl_cli.reports.persons import ended, person_blocks
 
 _OF = {
     "participant": "from the scatter between participants (Student's quantile, {freedom} degrees of freedom)",
@@ -41,7 +41,7 @@ def report(content: Mapping[str, Any]) -> list[Block]:
     """
     status = Status(content["status"])
     return [
-        Paragraph(f"Status: **{status.value}**: {status.advice}."),
+        Paragraph(f"Status: **{status.value}**: {ended(content)}."),
         parameter_table(content),
         *interval_notes(content),
         *person_blocks(content),
@@ -155,7 +155,7 @@ def roughness(method: str, errors: str, participants: int, demonstrations: int) 
     several = 1 < participants < FEW
     if method == "posterior":
         few = f" {participants} participants say little about how people differ." if several else ""
-        return f"Approximate: in simulations 81 to 90 % of such intervals covered, rather than 95 %.{few}"
+        return f"Approximate: in simulations 81 to 92 % of such intervals covered, rather than 95 %.{few}"
     if errors == "participant" and participants < FEW:
         return (
             f"Approximate, too wide rather than too narrow: {participants} participants say little about how people "
@@ -165,7 +165,7 @@ def roughness(method: str, errors: str, participants: int, demonstrations: int) 
         few = "with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %"
         narrow = (
             f"too narrow if people differ, about which {participants} say little (of three people who differ by 20 %, "
-            "73 to 95 % cover)"
+            "80 to 93 % cover)"
         )
         why = [few] * (demonstrations < FEW_DEMONSTRATIONS) + [narrow] * several
         return f"Approximate: {'; '.join(why)}."

@@ -11,7 +11,7 @@ from navirl_cli.errors import Number, counted
 from navirl_cli.irl.status import Status
 from navirl_cli.irl.uncertainty import correlation
 from navirl_cli.reports.evidence import evidence_remarks, reach_warnings
-from navirl_cli.reports.persons import person_warnings
+from navirl_cli.reports.persons import ended, person_warnings
 from navirl_cli.reports.repeated import repeated
 
 #: With fewer participants, their scatter is a rough estimate (Cameron and Miller 2015, J. Human Resources 50:317).
@@ -91,6 +91,7 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
             if one["standard_error"] is not None and one["standard_error"] > abs(one["value"]) / 2
         ]
     lines += _bias_warnings(parameters)
+    lines += _outside_warnings(content)
     lines += reach_warnings(content)
     lines += person_warnings(content)
     count = len(content["participants"])
@@ -98,9 +99,8 @@ def warnings(content: Mapping[str, Any], *, status: bool = True) -> list[str]:
         lines.append(
             f"errors and intervals by participant rest on {count} participants: they are rough with fewer than {FEW}"
         )
-    ended = Status(content["status"])
-    if status and ended is not Status.CONVERGED:
-        lines.append(f"{ended.value}: {ended.advice}")
+    if status and content["status"] != Status.CONVERGED.value:
+        lines.append(f"{content['status']}: {ended(content)}")
     return lines
 
 
@@ -120,3 +120,23 @@ def _bias_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
     else:
         remedy = "subtract it with `correct_bias`"
     return [f"maximum likelihood is expected to be off in {words}; {remedy}"]
+
+
+def _outside_warnings(content: Mapping[str, Any]) -> list[str]:
+    """The values that do not lie in their own interval, because the interval leaves the regulariser out."""
+    values = {one["name"]: one["value"] for one in content["parameters"]}
+    outside = dict.fromkeys(
+        one["name"]
+        for found in content.get("intervals") or ()
+        for one in found["parameters"]
+        if (one["lower"] is not None and values[one["name"]] < one["lower"])
+        or (one["upper"] is not None and values[one["name"]] > one["upper"])
+    )
+    if not outside or not content["l2"]:
+        return []
+    count, words = Number(len(outside)), " and ".join(outside)
+    line = (
+        f"the {count:value|values} of {words} {count:lies|lie} outside the interval: the regulariser decides "
+        f"{count:it|them}, because the demonstrations say so little; read the intervals, not the values"
+    )
+    return [line]

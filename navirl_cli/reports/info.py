@@ -5,6 +5,7 @@ from math import hypot
 from typing import Any
 
 from navirl_cli.artefacts.demonstrations import demonstrations_of
+from navirl_cli.artefacts.steps import held_steps
 from navirl_cli.documents.document import Block, Bullets, Heading
 from navirl_cli.documents.tables import Column, Table
 from navirl_cli.errors import ArgumentError, unknown
@@ -103,12 +104,20 @@ def _of_demonstrations(content: Content) -> dict[str, Any]:
         "groups": {name: len(some) for name, some in by_group(demonstrations_of(content, "file")).items()},
         "resolution_m": _unique([one["resolution_m"] for one in content["maps"].values()]),
         "robot_radius_m": _unique([one["robot_radius_m"] for one in own]),
-        "duration_s": float(sum(one["t_s"][-1] - one["t_s"][0] for one in own)),
+        "duration_s": _duration_s(own),
         "length_m": float(sum(map(_length_m, own))),
         "with_wrench": sum(one["contacts"] is not None for one in own),
         "truncated": sum(bool(one["truncated"]) for one in own),
         "with_warnings": sum(bool(one["warnings"]) for one in own),
+        "made_by": [one.line for one in held_steps(content)],
     }
+
+
+def _duration_s(own: Sequence[Content]) -> float | None:
+    """Time of all trials, s; None where that of one was not measured."""
+    if any(one.get("laid_out_m_s") is not None for one in own):
+        return None
+    return float(sum(one["t_s"][-1] - one["t_s"][0] for one in own))
 
 
 def _length_m(one: Content) -> float:
@@ -188,7 +197,7 @@ def _groups_table(content: Content) -> Table:
     )
     rows = []
     for name, some in by_group(demonstrations_of(content, "file")).items():
-        mean_s = sum(one.duration_s for one in some) / len(some)
+        mean_s = sum(one.duration_s for one in some) / len(some) if all(one.timed for one in some) else None
         rows.append((name, len(some), len({one.participant for one in some}), mean_s))
     return Table(columns, tuple(rows), note="Duration: mean of the group's trials.")
 

@@ -1,48 +1,17 @@
 """How a reward was made: from which demonstrations and with which settings, and the command lines for it."""
 
-import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from navirl_cli.artefacts.options import option_words
+from navirl_cli.artefacts.steps import Step, selection_words
 from navirl_cli.demos.demonstration import Demonstration
-from navirl_cli.demos.subset import Subset
 from navirl_cli.documents.document import Block, Bullets, Heading, Paragraph
 from navirl_cli.errors import counted
-from navirl_cli.files import MANIFEST, Input
+from navirl_cli.files import Input
 
 #: Defaults of a fit, as its file names them.
 _FIT = {"method": "newton", "l2": 1e-3, "learnt_from": "all", "terms": ["length", "deviation", "personal-space"]}
-#: Options of an extraction by the names of its settings.
-SETTINGS = {
-    "split": "split",
-    "resolution_m": "resolution",
-    "robot_radius_m": "robot_radius",
-    "rasterizer": "rasterizer",
-    "begins_n": "contact_force",
-    "cutoff_hz": "wrench_filter",
-    "people_m": "person",
-    "goal_m": "goal",
-    **{
-        name: name
-        for name in ("participant", "condition", "cycle", "set", "gain", "keep_truncated", "namespace", "time", "frame")
-    },
-    **{name: name for name in ("wrench_frame", "force_scale", "map", "trials", "strict", "join")},
-    "topics": "topic",
-}
-
-
-def _point(xy_m: Sequence[float]) -> str:
-    """A point as an option takes it."""
-    return ",".join(f"{axis:.15g}" for axis in xy_m)
-
-
-_FORMS: Mapping[str, Callable[[Any], Any]] = {
-    "person": lambda people: [_point(one) for one in people],
-    "goal": _point,
-    "topic": lambda topics: [f"{role}={name}" for role, names in topics.items() for name in names],
-}
 #: Options of a fit by the names in its file, for files that do not hold its options.
 _OPTIONS = {"method": "--method", "l2": "--l2", "learnt_from": "--steps", "terms": "--terms"}
 
@@ -64,22 +33,14 @@ class Made:
     seed: int
     #: All demonstrations of the file.
     everyone: Sequence[Demonstration]
+    #: Names of the demonstrations for command lines, and the commands that made them.
+    names: Sequence[str]
+    steps: Sequence[Step]
 
     @property
     def files(self) -> list[Input]:
         """All files with their hashes."""
         return [*self.inputs, *self.demos, self.reward]
-
-    @property
-    def logs(self) -> list[str]:
-        """Names of the logs among the inputs, which also hold a map and a table of labels."""
-        others = {self.settings.get("map"), self.settings.get("trials")}
-        return [one.file for one in self.inputs if one.file not in others]
-
-    @property
-    def names(self) -> list[str]:
-        """Of the demonstrations for command lines: a folder has a / at its end."""
-        return [one.file.removesuffix(MANIFEST) for one in self.demos]
 
 
 def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
@@ -99,13 +60,18 @@ def made_blocks(content: Mapping[str, Any], made: Made) -> list[Block]:
     ]
     settings = changed_settings(made.settings, made.usual)
     if settings:
-        changed = ", ".join(f"{name} {value}" for name, value in settings.items())
+        changed = ", ".join(
+            f"{name} {'not the same in all files' if value is None else value}" for name, value in settings.items()
+        )
         lines.append(f"Settings of the extraction other than the defaults: {changed}")
-    commands = _commands(taught, content, made)
+    fits = _fit_lines(taught, content, made)
+    asked = Step("report", (*made.names, made.reward.file), made.options, "report.html")
+    commands = [one.line for one in (*made.steps, *fits, asked)]
+    complete = fits and {one.output for one in made.steps} >= set(made.names)
     return [
         Heading("How it was made"),
         Bullets(tuple(f"{line}." for line in lines)),
-        Paragraph("The same by command lines" + (":" if len(commands) == 3 else ", as far as the files hold them:")),
+        Paragraph("The same by command lines" + (":" if complete else ", as far as the files hold them:")),
         Bullets(tuple(f"`{command}`" for command in commands)),
     ]
 
@@ -122,17 +88,13 @@ def changed_settings(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -
     return found
 
 
-def _commands(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
-    """Command lines; none for a fit with a prior of a file without options, which does not name it."""
-    demos, reward = made.names, made.reward.file
-    lines = [["report", *demos, reward, *made.options, "-o", "report.html"]]
+def _fit_lines(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[Step]:
+    """The fit; none with a prior of a file without options, which does not name it."""
     options = content.get("options")
-    if options is not None or (taught and not content["prior"]):
-        words = _fit_words(taught, content, made) if options is None else options
-        lines.insert(0, ["fit", *demos, *words, "-o", reward])
-    if len(demos) == 1:  # which log is in which of several files is not known
-        lines.insert(0, ["extract", *made.logs, *extract_words(made.settings, made.usual), "-o", *demos])
-    return [shlex.join(["navirl", *line]) for line in lines]
+    if options is None and (not taught or content["prior"]):
+        return []
+    words = _fit_words(taught, content, made) if options is None else options
+    return [Step("fit", tuple(made.names), tuple(words), made.reward.file)]
 
 
 def _fit_words(taught: Sequence[Demonstration], content: Mapping[str, Any], made: Made) -> list[str]:
@@ -144,42 +106,3 @@ def _fit_words(taught: Sequence[Demonstration], content: Mapping[str, Any], made
         for word in (option, ",".join(content[name]) if name == "terms" else f"{content[name]}")
     ]
     return [*selection_words(made.everyone, taught), *changed]
-
-
-def extract_words(settings: Mapping[str, Any], defaults: Mapping[str, Any]) -> list[str]:
-    """The settings of an extraction that are no defaults, as options of the command line.
-
-    Args:
-        settings: As in a demonstrations file; older files lack some.
-        defaults: As in a demonstrations file that is extracted without options.
-    """
-    flat, usual = {**settings, **settings.get("push", {})}, {**defaults, **defaults["push"]}
-    given = {option: flat.get(name, usual[name]) for name, option in SETTINGS.items()}
-    given["no_wrench"] = not flat.get("wrench", True)
-    for option, form in _FORMS.items():
-        if given[option]:
-            given[option] = form(given[option])
-    return option_words(given, {option: usual[name] for name, option in SETTINGS.items()})
-
-
-def selection_words(everyone: Sequence[Demonstration], taught: Sequence[Demonstration]) -> list[str]:
-    """The shortest options that choose exactly some demonstrations: by condition, cycle and set, or one by one."""
-    whole = [one for one in everyone if not one.truncated or one in taught]
-    conditions = tuple(dict.fromkeys(one.condition.value for one in taught))
-    cycles = tuple(dict.fromkeys(one.cycle for one in taught if one.cycle is not None))
-    sets = tuple(dict.fromkeys(one.set or "main task" for one in taught))
-    for chosen in (
-        Subset(),
-        Subset(condition=conditions),
-        Subset(cycle=cycles),
-        Subset(condition=conditions, cycle=cycles),
-        Subset(condition=conditions, cycle=cycles, set=sets),
-    ):
-        if [one.id for one in chosen.of(whole)] == [one.id for one in taught]:
-            return subset_words(chosen)
-    return subset_words(Subset(trial=tuple(one.id for one in taught)))
-
-
-def subset_words(subset: Subset) -> list[str]:
-    """A choice of demonstrations as options of a command."""
-    return [word for field, names in vars(subset).items() for name in names for word in (f"--{field}", str(name))]

@@ -5,9 +5,28 @@ from typing import Any
 
 from navirl_cli.documents.document import Block, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
+from navirl_cli.irl.random_effects import AGREES
+from navirl_cli.irl.status import Status
 
-#: With fewer effective draws, or a smaller share of them, a person's numbers are rough.
-FEW_DRAWS, FEW_SHARE = 20, 0.25
+#: With fewer effective draws a person's numbers are rough.
+FEW_DRAWS = 20
+_ENDED = {
+    Status.CONVERGED: f"another draw moves the typical reward and the scatters by less than {AGREES:g} standard errors",
+    Status.STOPPED_EARLY: (
+        f"draws still move the typical reward or the scatters by more than {AGREES:g} standard errors: all numbers are "
+        "approximate; more demonstrations of each person help"
+    ),
+}
+
+
+def ended(content: Mapping[str, Any]) -> str:
+    """How the fit ended and what that means; people who differ are integrated over, not at a maximum.
+
+    Args:
+        content: Of the reward file.
+    """
+    status = Status(content["status"])
+    return _ENDED.get(status, status.advice) if content.get("population") else status.advice
 
 
 def person_blocks(content: Mapping[str, Any]) -> list[Block]:
@@ -92,9 +111,11 @@ def sampled(population: Mapping[str, Any]) -> str:
 def likelihoods(population: Mapping[str, Any]) -> str:
     """The likelihood with differences between people, and without."""
     differ, alike = population["log_likelihood"], population["log_likelihood_alike"]
+    shown = any(one["people_differ"] for one in population["parameters"])
+    unshown = " The demonstrations do not show that people differ: the scatters above owe much to their weak prior."
     return (
-        f"Log-likelihood with people who differ, integrated over the reward of each: {differ:.2f}; people alike: "
-        f"{alike:.2f} ({differ - alike:+.2f})."
+        f"Log-likelihood with people who differ as above, integrated over the reward of each: {differ:.2f}; people "
+        f"alike: {alike:.2f} ({differ - alike:+.2f}).{'' if shown else unshown}"
     )
 
 
@@ -120,8 +141,7 @@ def person_warnings(content: Mapping[str, Any]) -> list[str]:
 
 
 def _is_rough(one: Mapping[str, Any]) -> bool:
-    effective = one["effective_draws"] or 0.0
-    return bool(effective < min(FEW_DRAWS, one["draws"]) or effective < FEW_SHARE * one["draws"])
+    return bool((one["effective_draws"] or 0.0) < FEW_DRAWS)
 
 
 def _names(population: Mapping[str, Any]) -> Sequence[str]:

@@ -37,7 +37,7 @@ from navirl_cli.reports.fit import (
 )
 from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
 from navirl_cli.reports.made import Made, made_blocks
-from navirl_cli.reports.persons import person_blocks
+from navirl_cli.reports.persons import ended, person_blocks
 from navirl_cli.reports.pictures import pictures
 from navirl_cli.reports.ranks import group_ranks_table, rank_lines, rank_table
 from navirl_cli.reports.recommendation import recommendation_blocks
@@ -124,7 +124,7 @@ def _summary(demonstrations: Sequence[Demonstration], learnt: LearntReward, cont
     return (
         f"{counted(len(demonstrations), 'demonstration')} of {everyone}, and a navigation reward learnt from "
         f"{len(learnt.demonstrations)} of them, of {people(content)}. "
-        f"The fit ended with the status **{learnt.status.value}**: {learnt.status.advice}."
+        f"The fit ended with the status **{learnt.status.value}**: {ended(content)}."
     )
 
 
