@@ -128,7 +128,7 @@ def test_info_shows_what_a_file_holds_and_single_values(navirl):
     assert summary["groups"] == {"force, cycle 1": 1, "force, cycle 2": 1, "force, cycle 3": 1}
     assert summary["participants"] == ["p"]
     navirl("plan", "r.json", "--scene", "a.json", "-o", "plan.json")
-    navirl("evaluate", "a.json", "-o", "m.json")
+    navirl("evaluate", "a.json", "--reward", "r.json", "--samples", 2, "-o", "m.json")
     values = {
         ("a.json", "demonstrations"): 3,
         ("r.json", "parameters.c0"): found.reward.theta[0],
@@ -148,3 +148,7 @@ def test_info_shows_what_a_file_holds_and_single_values(navirl):
     assert "found format 'navirl/log'" in navirl("info", "x.json", code=1).stderr
     for kind in ("plan", "m"):
         assert "navirl: " in navirl("info", f"{kind}.json").stdout
+    learnt = next(one for one in json.loads(Path("m.json").read_text())["groups"] if one["path_type"] == "learnt")
+    exact = learnt["exact"]["length_m"]
+    assert f"{exact:.4f}" != f"{learnt['mean']['length_m']:.4f}"
+    assert f" {exact:.4f} " in navirl("info", "m.json").stdout  # as evaluate prints it

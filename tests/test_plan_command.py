@@ -47,6 +47,13 @@ def test_the_table_compares_the_path_with_the_nominal_one(scene):
     assert "expected" in text
     assert "nominal" in text
     assert "personal space" in text
+    assert "The nominal path touches a person; the reward allows that, and planned paths do not." in text
+
+
+def test_a_name_given_as_a_position_is_told_the_option_for_names(scene):
+    message = run("plan", *scene, "--person", "p02", code=2)
+    assert "expected two numbers in m as x,y, found 'p02'; --person-name takes a name" in message
+    assert "--person-name" not in run("extract", LOG, "-o", "x.json", "--person", "p02", code=2)
 
 
 def test_the_likely_path_warns_where_the_policy_passes_farther_away():

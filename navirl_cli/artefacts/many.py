@@ -46,6 +46,7 @@ class Written:
     demonstrations: int
     lost: tuple[str, ...]
     notes: tuple[str, ...]
+    fetched: tuple[str, ...]
 
 
 @dataclass(eq=False)
@@ -62,6 +63,8 @@ class Folder:
     entries: dict[str, Entry] = field(default_factory=dict)
     #: Number of logs that were not read again.
     unchanged: int = 0
+    #: What was read of objects in a store, by address. A manifest does not keep it: the next run reads something else.
+    _fetched: dict[str, tuple[str, ...]] = field(default_factory=dict)
     #: Addresses in the order of the manifest, and the names of demonstrations files by address. Both are chosen before
     #: the work, so that they do not depend on which log is done first.
     _order: list[str] = field(default_factory=list)
@@ -116,6 +119,11 @@ class Folder:
         if notes and found:
             found[0] = replace(found[0], notes=(*notes, *found[0].notes))
         return [*found, *failed]
+
+    @property
+    def fetched(self) -> list[str]:
+        """What was read of objects in a store."""
+        return [line for address in self._order for line in self._fetched.get(address, ())]
 
     @property
     def _options_sha256(self) -> str:
@@ -193,6 +201,7 @@ class Folder:
             hashes = [one.sha256 for one in result.inputs]
             files = tuple(replace(part, sha256=own) for part, own in zip(parts, hashes, strict=True))
             entry = self._stored(replace(entry, files=files), result)
+            self._fetched[entry.address] = result.fetched
         self.entries[entry.address] = entry
 
     def _stored(self, entry: Entry, result: Written) -> Entry:
@@ -290,7 +299,7 @@ def _written(
     notes = (*extraction.notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes))
     lost = (*extraction.damage, *extraction.skipped)
     content = as_bytes("demonstrations", document)
-    return Written(content, inputs, extraction.trials, len(demonstrations), lost, notes)
+    return Written(content, inputs, extraction.trials, len(demonstrations), lost, notes, extraction.fetched)
 
 
 def check_some(entries: Sequence[Entry]) -> None:

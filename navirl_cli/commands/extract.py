@@ -310,7 +310,7 @@ def _into_folder(
         echo_json({"logs": [asdict(one) for one in entries], "unchanged": folder.unchanged})
     else:
         echo(to_text([log_table(entries, folder.unchanged)]))
-    for line in merged([note for one in entries for note in one.notes]):
+    for line in merged([*(note for one in entries for note in one.notes), *folder.fetched]):
         say(line)
     lost = [line for one in entries for line in one.lost]
     finish([*(f"left out: {one.reason}" for one in entries if one.reason is not None), *lost])

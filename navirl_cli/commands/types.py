@@ -119,7 +119,9 @@ class Point(click.ParamType):  # type: ignore[type-arg]
         try:
             x, y = (float(part) for part in str(value).split(","))
         except ValueError:
-            self.fail(f"expected two numbers in m as x,y, found {value!r}", param, ctx)
+            names = {one.name for one in ctx.command.params} if ctx else set()
+            hint = "; --person-name takes a name" if param and param.name == "people" and "person_name" in names else ""
+            self.fail(f"expected two numbers in m as x,y, found {value!r}{hint}", param, ctx)
         if not (isfinite(x) and isfinite(y)):
             self.fail(f"expected finite numbers, found {value!r}", param, ctx)
         return x, y

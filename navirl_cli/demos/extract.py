@@ -83,6 +83,8 @@ class Extraction(ByContent):
     damage: tuple[str, ...]
     #: What is unusual about the recording; notes on a trial are in its demonstration.
     notes: tuple[str, ...]
+    #: What was read of objects in a store, which is true of this run alone.
+    fetched: tuple[str, ...] = ()
     #: How fast the robot gives way to a push; None where it was not requested, or no push allows an estimate.
     gain: Gain | None = None
     #: Names of the paths whose cells were published with the log, and whether our cells are equal.

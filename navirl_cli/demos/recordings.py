@@ -57,7 +57,7 @@ class Recordings:
 
     def notes(self, demonstrations: Iterable[Demonstration]) -> list[str]:
         """What is unusual about recordings and about their demonstrations, as ``name: text``."""
-        notes = [*self.label_notes, *(note for one in self.extractions for note in one.notes)]
+        notes = [*self.label_notes, *(note for one in self.extractions for note in (*one.notes, *one.fetched))]
         return [*notes, *(f"{one.id}: {note}" for one in demonstrations for note in one.notes)]
 
     @property
@@ -161,15 +161,15 @@ def rows_of(
     return labels_by_source(labels, sources)
 
 
-def _fetched(source: Source) -> list[str]:
+def _fetched(source: Source) -> tuple[str, ...]:
     """What was read of the objects of a recording."""
     remote = [path.fetched for path in source.files if isinstance(path, Remote)]
     if not remote:
-        return []
+        return ()
     done, size = sum(one.size_read for one in remote) / 1e6, sum(one.size for one in remote) / 1e6
-    return [
-        f"{source.name}: {done:.1f} of {size:.1f} MB were fetched in {sum(one.requests for one in remote)} requests"
-    ]
+    return (
+        f"{source.name}: {done:.1f} of {size:.1f} MB were fetched in {sum(one.requests for one in remote)} requests",
+    )
 
 
 def _counted_reasons(failed: Iterable[NavirlError]) -> list[str]:
@@ -226,7 +226,7 @@ def extracted(
             hashed = hashes.result()
         # of an object in a store only what was read counts, which is known now
         inputs = tuple(hashed[path] if path in hashed else Input.of(path) for path in source.files)
-        return inputs, replace(extraction, notes=(*extraction.notes, *_fetched(source)))
+        return inputs, replace(extraction, fetched=_fetched(source))
     except NavirlError as error:
         return error
     except Exception as error:

@@ -70,11 +70,12 @@ class Profiler:
         if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere
             top = climbed(estimate)
         known = [_known(objective.place(top))]
-        along = {
-            j: Scan(plain, plain.bounds, free, None, known, most, found.scanned).follow(j, values)
-            for j, values in plain.scans()
-            if free[j]
-        }
+        along: dict[int, list[Point]] = {}
+        for j, values in plain.scans():
+            if free[j]:
+                scan = Scan(plain, plain.bounds, free, None, known, most, found.scanned)
+                scan.follow(j, values)
+                along[j] = scan.places  # those that are not of interest too: others begin there
         seen = [top, estimate, *(objective.point(place) for places in along.values() for place in places)]
         best = max(seen, key=lambda point: point.value)
         if best is not top:  # it is on another branch, or much farther along a ridge
@@ -213,7 +214,7 @@ class Profiler:
             near = self._promising(i, values, j, place) if others[i] else []
             if near:
                 starts = [self._shifted(one, i, j, float(place.x[j])) for one in self.along[i]]
-                search = Scan(plain, plain.bounds, others, None, [_known(place)], -higher, starts)
+                search = Scan(plain, plain.bounds, others, None, [_known(place)], -higher, starts, inf)
                 found += search.follow(i, near)
         best = max(found, key=lambda one: one.value, default=place)
         return self.objective.point(best) if best.value > place.value + higher else None

@@ -49,6 +49,8 @@ class Scan:
     fall: float = 0.0
     #: Places on the profile of nearly the same objective: where to begin, or what to take where nothing is of interest.
     starts: Sequence[Point] = ()
+    #: So far below what is of interest such a place is taken, nats; inf to begin there at least.
+    far: float = FAR
     #: Places found on profiles.
     visited: list[Point] = field(default_factory=list, init=False)
     _seen: dict[float, _Place] = field(default_factory=dict, init=False)
@@ -92,13 +94,17 @@ class Scan:
             near = here in {low, high} or self._peak(low, high) > self.top.value - self.fall
             if value not in self._seen and near:
                 self._visit(j, value)
-        places = [one.point for _, one in sorted(self._seen.items())]
-        return [point for point in places if point.value >= self.top.value - self.fall]
+        return [point for point in self.places if point.value >= self.top.value - self.fall]
+
+    @property
+    def places(self) -> list[Point]:
+        """All places on the profile that was followed last, by the variable, ascending."""
+        return [one.point for _, one in sorted(self._seen.items())]
 
     def _visit(self, j: int, value: float) -> None:
         """The best of the other variables at a value of this one; nothing where there is no policy."""
         known = next((one for one in self.starts if np.isclose(one.x[j], value, rtol=1e-12)), None)
-        if known is not None and known.value < self.top.value - self.fall - FAR:
+        if known is not None and known.value < self.top.value - self.fall - self.far:
             self._seen[value] = _Place(known, float(known.gradient[j]) * value)
             return
         last = self._seen[min(self._seen, key=lambda other: abs(np.log(other / value)))].point

@@ -163,7 +163,10 @@ def roughness(method: str, errors: str, participants: int, demonstrations: int) 
         )
     if errors == "model" and (several or demonstrations < FEW_DEMONSTRATIONS):
         few = "with so few demonstrations 84 to 98 % of such intervals cover, rather than 95 %"
-        narrow = f"too narrow if people differ, about which {participants} say little"
+        narrow = (
+            f"too narrow if people differ, about which {participants} say little (of three people who differ by 20 %, "
+            "80 to 93 % cover)"
+        )
         why = [few] * (demonstrations < FEW_DEMONSTRATIONS) + [narrow] * several
         return f"Approximate: {'; '.join(why)}."
     return ""

@@ -211,7 +211,12 @@ def _means_table(content: Content) -> Table:
         *(Column(name, significant=4) for name in names),
     )
     rows = [
-        (one["group"], one["path_type"], one["count"], *(one["mean"].get(name) for name in names))
+        (
+            one["group"],
+            one["path_type"],
+            one["count"],
+            *({**one["mean"], **one.get("exact", {})}.get(name) for name in names),
+        )
         for one in content["groups"]
     ]
     return Table(columns, tuple(rows), note="Means over demonstrations, or of the learnt policy.")

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from navirl_cli.documents.tables import Column, Format, Table, written
+from navirl_cli.evaluation.motion import PERSON_RADIUS_M
 from navirl_cli.planning.paths import Mode, Planner
 
 #: The most probable path is not typical where it passes people nearer than paths of the policy do by this, m.
@@ -41,6 +42,8 @@ def _paths_table(content: Mapping[str, Any]) -> Table:
         for name, one in (*named[:_MOST_ROWS], ("nominal", content["nominal"]))
     ]
     note = "Min. distance: from the robot's shell to a person's centre." if people else ""
+    if people and content["nominal"]["min_distance_m"] < PERSON_RADIUS_M:
+        note += " The nominal path touches a person; the reward allows that, and planned paths do not."
     if len(named) > _MOST_ROWS:
         note = f"{len(named) - _MOST_ROWS} more paths are in the file. {note}"
     return Table(tuple(columns), tuple(rows), note=note)
