@@ -3,8 +3,9 @@
 python benchmarks/commands.py [--quick] [--json]. CPU time is the user and system time of the process and its children.
 Baseline and commands run alternately, and medians are compared. The commands run on one sample log and its
 demonstrations; evaluate and report also on the demonstrations of the published study, if its data are available
-(NAVIRL_STUDY_DIR, or ../shared/study). Each row ends with its bar; exit 0 only where every bar holds. --quick leaves
-out the study and the demo.
+(NAVIRL_STUDY_DIR, or ../shared/study). One row compares a fit from Python with as many threads of BLAS as numpy starts
+by itself to the same with one, as on the command line. Rows end with their bar; exit 0 only where every bar holds.
+--quick leaves out the study and the demo.
 """
 
 import argparse
@@ -28,6 +29,9 @@ STUDY_DEMONSTRATIONS = 130
 BASELINE = (sys.executable, "-c", "import numpy")
 NAVIRL = (sys.executable, "-m", "navirl_cli")
 UNIT = "x numpy"
+#: A fit as in a notebook, and the number of threads of BLAS in the environment: unset, one.
+FIT = (sys.executable, "-c", "import navirl_cli; navirl_cli.fit('demos.json', condition='force', cycle=2)")
+FREE, ONE = ("env", "-u", "OPENBLAS_NUM_THREADS", *FIT), ("env", "OPENBLAS_NUM_THREADS=1", *FIT)
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,16 @@ def measured(jobs: Sequence[Job], runs: int, folder: Path) -> list[Row]:
     return [Row.at_most(job.what, statistics.median(times[job.what]) / unit_s, UNIT, job.bar) for job in jobs]
 
 
+def threads_row(runs: int, folder: Path) -> Row:
+    """CPU time of a fit from Python, by what one thread of BLAS takes."""
+    times: dict[tuple[str, ...], list[float]] = {FREE: [], ONE: []}
+    for _ in range(runs):
+        for words, own in times.items():
+            own.append(cpu_s(words, folder))
+    ratio = statistics.median(times[FREE]) / statistics.median(times[ONE])
+    return Row(f"fit from Python, BLAS threads of {os.cpu_count()} cores", ratio, "x one thread")
+
+
 def main() -> int:
     """Measure, print, compare with the bars."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -113,7 +127,8 @@ def main() -> int:
     options = parser.parse_args()
     with TemporaryDirectory() as name:
         folder = Path(name)
-        rows = measured(sample_jobs(folder), 3 if options.quick else 9, folder)
+        runs = 3 if options.quick else 9
+        rows = [*measured(sample_jobs(folder), runs, folder), threads_row(runs, folder)]
         if not options.quick:
             if STUDY.is_dir():
                 rows += measured(study_jobs(folder), 3, folder)

@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from read_log import write
-from rows import Row, report
+from rows import Row, report, shown
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
@@ -206,11 +206,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="number of logs")
     parser.add_argument("--json", action="store_true", help="print JSON")
     given = parser.parse_args()
-    found = []
-    for row in rows(given.count):
-        found.append(row)
-        print(f"{row.what}: {row.value:.4g} {row.unit}", file=sys.stderr, flush=True)
-    return report(found, as_json=given.json)
+    return report(shown(rows(given.count)), as_json=given.json)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """Measure random effects over participants: on simulated people whose truth is known, and on the published study.
 
-python benchmarks/persons.py [--part simulated|study] [--sets N] [--quick] [--json]. Simulated: sets of 36 people with
-two paths each, whose parameters are scattered by 10 to 25 % around a typical person. Each set is fitted as one person
-and with random effects; counted is whose 95 % intervals cover the typical person. Study (environment variable
-NAVIRL_STUDY_DIR: the unpacked runs): each path is left out and predicted by the person's own other path, by the other
-people, by all together as one person, and by random effects. Exit 0 only where every bar holds. --quick takes one set
-of 18 people.
+python benchmarks/persons.py [--part simulated|study] [--sets N] [--first N] [--quick] [--json]. Simulated: sets of 36
+people with two paths each, whose parameters are scattered by 10 to 25 % around a typical person. Each set is fitted as
+one person and with random effects; counted is whose 95 % intervals cover the typical person. Study (environment
+variable NAVIRL_STUDY_DIR: the unpacked runs): each path is left out and predicted by the person's own other path, by
+the other people, by all together as one person, and by random effects. Exit 0 only where every bar holds. --quick takes
+one set of 18 people, --first other sets than the first ones.
 """
 
 import argparse
@@ -68,13 +68,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--part", choices=("simulated", "study"), help="one part alone")
     parser.add_argument("--sets", type=int, default=SETS, help="simulated sets")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first simulated set")
     parser.add_argument("--quick", action="store_true", help="one set of 18 people")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
     options = parser.parse_args()
     rows: list[Row] = []
     if options.part != "study":
         count, sets = (QUICK_PEOPLE, 1) if options.quick else (PEOPLE, options.sets)
-        rows += simulated(count, sets)
+        rows += simulated(count, range(options.first, options.first + sets))
     if options.part != "simulated":
         where = Path(os.environ.get("NAVIRL_STUDY_DIR") or Path(__file__).parents[2] / "shared" / "study")
         if where.exists():
@@ -122,9 +123,9 @@ def fitted(seed: int, count: int) -> Fitted:
     return Fitted(*theta, *covers, found.scatter, scattered, float(inside.mean()), cpu_s)
 
 
-def simulated(count: int, sets: int) -> Iterator[Row]:
+def simulated(count: int, seeds: Sequence[int]) -> Iterator[Row]:
     """Whose intervals cover the typical person."""
-    found = list(map_in_order(partial(fitted, count=count), list(range(sets))))
+    found, sets = list(map_in_order(partial(fitted, count=count), list(seeds))), len(seeds)
     mean = {name: np.mean([getattr(one, name) for one in found], axis=0) for name in Fitted.__dataclass_fields__}
     for j, name in enumerate(NAMES):
         title = f"{name} {TYPICAL[j]:g}, {sets} sets of {count} people"

@@ -2,8 +2,9 @@
 
 import json
 import statistics
+import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 
@@ -26,6 +27,15 @@ class Row:
     def at_least(what: str, value: float, unit: str, bar: float) -> "Row":
         """A row whose value must reach its bar."""
         return Row(what, value, unit, f">= {bar:g} {unit}".rstrip(), value >= bar)
+
+
+def shown(rows: Iterable[Row]) -> list[Row]:
+    """Rows that take long, each named on standard error as soon as it is measured."""
+    found = []
+    for row in rows:
+        found.append(row)
+        print(f"{row.what}: {row.value:.4g} {row.unit}", file=sys.stderr, flush=True)
+    return found
 
 
 def report(rows: Sequence[Row], *, as_json: bool) -> int:

@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 os.environ["OMP_NUM_THREADS"] = "1"  # as the command sets it
 
 import numpy as np
-from rows import Row, report
+from rows import Row, report, shown
 from scenes import PUBLISHED, hallway
 
 from navirl_cli.artefacts.demonstrations import demonstrations_document, read_demonstrations
@@ -145,11 +145,7 @@ def main() -> int:
     parser.add_argument("--scenes", type=int, default=5000, help="number of scenes, with two demonstrations each")
     parser.add_argument("--json", action="store_true", help="print JSON")
     given = parser.parse_args()
-    found = []
-    for row in rows(given.scenes):
-        found.append(row)
-        print(f"{row.what}: {row.value:.4g} {row.unit}", file=sys.stderr, flush=True)
-    return report(found, as_json=given.json)
+    return report(shown(rows(given.scenes)), as_json=given.json)
 
 
 if __name__ == "__main__":

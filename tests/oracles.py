@@ -217,11 +217,17 @@ def turn_flow(
 
 
 def scattered_people(
-    log_likelihoods: FloatArray, places: FloatArray, means: FloatArray, scatters: FloatArray, width: float
+    log_likelihoods: FloatArray,
+    places: FloatArray,
+    means: FloatArray,
+    scatters: FloatArray,
+    width: float,
+    center: float,
+    mean_width: float,
 ) -> dict[str, FloatArray]:
     """All that is unknown about people who are scattered in one variable, on a grid and without any approximation.
 
-    Person i has y_i ~ N(m, s^2) and is seen through a log-likelihood. The mean m may be anywhere; s is beforehand half
+    Person i has y_i ~ N(m, s^2) and is seen through a log-likelihood. Beforehand m is normal and s half
     normal.
 
     Args:
@@ -230,6 +236,8 @@ def scattered_people(
         means: Even grid of m.
         scatters: Grid of s, even in its logarithm.
         width: Of the distribution of s.
+        center: Of the distribution of m.
+        mean_width: Its standard deviation.
 
     Returns:
         "mean": expectation and standard deviation of m; "scatter": median of s; "people": (people, 2) expectation and
@@ -245,6 +253,7 @@ def scattered_people(
             of_person = each.sum(axis=1)
             # the density of log s is s times that of s
             weight[i, j] = np.log(of_person).sum() - 0.5 * (s / width) ** 2 + log(s)
+            weight[i, j] -= 0.5 * ((m - center) / mean_width) ** 2
             first[:, i, j] = each @ places / of_person
             second[:, i, j] = each @ places**2 / of_person
     weight = np.exp(weight - weight.max())

@@ -44,6 +44,7 @@ SLOW = {
     ],
 )
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")  # a page sets it: restored afterwards
     pytest.importorskip("pandas")
     monkeypatch.chdir(tmp_path)
     mpl.use("agg")

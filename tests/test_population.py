@@ -11,8 +11,10 @@ from navirl_cli.irl.analyses import Pool, Questions
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
 from navirl_cli.irl.likelihood import log_likelihood
+from navirl_cli.irl.log_scale import LogScale, Witness, companies
 from navirl_cli.irl.newcomer import Others, newcomer
 from navirl_cli.irl.population import population
+from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.selection import Steps
 from navirl_cli.irl.spread import Spread
@@ -21,6 +23,7 @@ from navirl_cli.parallel import Local
 
 TRUTH = np.array([-40.0, -2.0, -5.0, 2.0])
 SCATTER = 0.25
+REWARD = Reward(tuple(TRUTH))
 
 
 def people(count, each=2, seed=1):
@@ -94,3 +97,17 @@ def test_what_only_a_pooled_fit_answers_is_refused():
     for asked in ({"bootstrap": 10}, {"profiles": ("c0",)}, {"cross_validate": True}, {"correct_bias": True}):
         with pytest.raises(ArgumentError, match="`pool` persons has intervals of its own and no prior: leave out "):
             Questions(pool=Pool.PERSONS, **asked).check_arguments(Steps.ALL, prior=False, l2=0.0)
+
+
+def test_people_in_the_same_scenes_are_asked_together():
+    small = make.scene_on(make.open_grid(9, 7), (1, 3), (7, 3), [(0.4, 0.3)])
+    elsewhere = [replace(one, participant="p9", id=f"p9/{k}") for k, one in enumerate(make.drawn(small, REWARD, 2, 5))]
+    evidence = evidence_of([*people(3), *elsewhere])
+    scale = LogScale(REWARD, np.ones(4, dtype=bool))
+    share = Prior.l2(REWARD.parameters, 0.01)
+    alone = [Witness(name, evidence.apart(name)[1], scale, share) for name in evidence.people]
+    groups = companies(evidence, alone)
+    assert [one.members.tolist() for one in groups] == [[0, 1, 2], [3]]
+    y = scale.of(REWARD) + 0.1
+    assert np.concatenate([one.values(y) for one in groups]) == pytest.approx([one.value(y) for one in alone])
+    assert (groups[0].values(y + 40) == -np.inf).all()

@@ -9,9 +9,9 @@ from scipy.stats import chi2
 
 from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.newton import Point
-from navirl_cli.irl.nodes import draw, laplace, sampled, scattered
+from navirl_cli.irl.nodes import Alone, Nodes, draw, laplace, sampled, scattered
 from navirl_cli.irl.random_effects import random_effects
-from navirl_cli.irl.restricted import LEAST, WIDTH, Restricted
+from navirl_cli.irl.restricted import LEAST, MEAN_TIMES, WIDTH, Restricted
 from navirl_cli.irl.spread import Factors, Spread
 from navirl_cli.parallel import Local
 
@@ -68,7 +68,13 @@ def test_lopsided_people_are_those_of_a_grid():
     places = np.linspace(-3, 4, 500)
     logs = np.array([[one.value(np.array([y])) for y in places] for one in people])
     twin = oracles.scattered_people(
-        logs, places, np.linspace(-0.5, 2.5, 60), np.exp(np.linspace(np.log(LEAST), np.log(3), 60)), WIDTH
+        logs,
+        places,
+        np.linspace(-0.5, 2.5, 60),
+        np.exp(np.linspace(np.log(LEAST), np.log(3), 60)),
+        WIDTH,
+        1.0,
+        MEAN_TIMES * WIDTH,
     )
     assert found.converged
     mean, covariance = found.mixture.typical()
@@ -90,9 +96,8 @@ def test_far_from_their_spread_skewed_people_are_still_those_of_a_grid():
     weight = np.exp(logs + far.log_density(places[:, None]))
     exact = np.log(weight.sum(axis=1) * (places[1] - places[0]))
     around = [laplace(one, near.wider(2.0), near.mean) for one in people]
-    known = sampled(
-        [draw(one, mode, number=k) for k, (one, mode) in enumerate(zip(people, around, strict=True))], near.wider(2.0)
-    )
+    nodes = [draw(Alone(one, k), mode, number=k) for k, (one, mode) in enumerate(zip(people, around, strict=True))]
+    known = sampled(nodes, around, near.wider(2.0))
     mean, *_, found = known.moments(far)
     assert found == pytest.approx(exact, abs=0.02)
     assert mean[:, 0] == pytest.approx(weight @ places / weight.sum(axis=1), abs=0.02)
@@ -105,10 +110,11 @@ def test_draws_around_two_approximations_count_together():
     person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
     mode = laplace(person, spread, spread.mean)
     beside = replace(mode, mean=mode.mean + 1.0)
-    both = draw(person, beside).and_also(draw(person, mode, number=1))
+    alone = Alone(person)
+    both = Nodes.together([draw(alone, beside), draw(alone, mode, number=1)])
     assert both.around == (beside, mode)
-    right = sampled([draw(person, mode, number=2)], spread).posteriors(spread)[0]
-    known = sampled([both], spread).posteriors(spread)[0]
+    right = sampled([draw(alone, mode, number=2)], [mode], spread).posteriors(spread)[0]
+    known = sampled([both], [mode], spread).posteriors(spread)[0]
     assert known.drawn == 2 * right.drawn
     assert known.mean == pytest.approx(right.mean, abs=0.05 * np.sqrt(right.covariance[0, 0]))
     assert known.evidence == pytest.approx(right.evidence, abs=0.02)
@@ -116,7 +122,8 @@ def test_draws_around_two_approximations_count_together():
 
 def test_a_posterior_under_a_spread_is_that_of_a_grid():
     person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
-    known = sampled([draw(person, laplace(person, spread, spread.mean))], spread).posteriors(spread)[0]
+    mode = laplace(person, spread, spread.mean)
+    known = sampled([draw(Alone(person), mode)], [mode], spread).posteriors(spread)[0]
     places = np.linspace(-4, 5, 20_001)
     logs = np.array([person.value(np.array([y])) for y in places]) + spread.log_density(places[:, None])
     weight = np.exp(logs)
@@ -153,7 +160,7 @@ def test_people_who_are_alike_are_not_said_to_differ():
 def test_derivatives_of_the_restricted_likelihood():
     people, rng = bells(5), np.random.default_rng(1)
     spread = Spread(np.array([1.1, 1.9]), np.array([0.3, 0.25]))
-    objective = Restricted(Factors.of([laplace(one, spread, spread.mean) for one in people], spread))
+    objective = Restricted(Factors.of([laplace(one, spread, spread.mean) for one in people], spread), np.zeros(2))
     x = spread.x + rng.normal(0, 0.2, 4)
     point = objective(x)
     assert point.gradient == pytest.approx(oracles.derivative(lambda z: objective(z).value, x), abs=1e-6)
@@ -169,3 +176,51 @@ def test_nodes_are_even_and_their_density_is_right():
     pull = person.precision @ person.at
     exact = 0.5 * pull @ np.linalg.solve(both, pull) - 0.5 * np.linalg.slogdet(both)[1] - 0.5 * pull @ person.at
     assert np.log(np.exp(logs).mean()) == pytest.approx(exact, abs=2e-3)
+
+
+@dataclass
+class Pair:
+    """People who are asked together."""
+
+    people: list
+    members: np.ndarray
+
+    def values(self, y):
+        return np.array([one.value(y) for one in self.people])
+
+
+def test_shared_nodes_serve_everybody_in_any_order():
+    first, second, third = (Lopsided(at, 5.0) for at in (0.2, 0.7, 1.3))
+    spread = Spread(np.array([0.8]), np.array([0.5]))
+    modes = [laplace(one, spread, spread.mean) for one in (first, second, third)]
+    exact = sampled(
+        [draw(Alone(one, k), modes[k], 2000) for k, one in enumerate((first, second, third))], modes, spread
+    )
+    pair = Pair([third, first], np.array([2, 0]))
+    shared = Nodes.together([draw(pair, modes[2], 100), draw(pair, modes[0], 150, number=1)])
+    assert shared.counts == (200, 300)
+    known = sampled([shared, draw(Alone(second, 1), modes[1], 200)], modes, spread).moments(spread)
+    for found, expected in zip(known, exact.moments(spread), strict=True):
+        assert found == pytest.approx(expected, abs=5e-3)
+
+
+def test_the_error_of_nodes_is_known():
+    person, spread = Lopsided(0.3, 4.0), Spread(np.array([0.8]), np.array([0.6]))
+    mode = laplace(person, spread, spread.mean)
+    slopes, noise = [], []
+    for number in range(60):
+        known = sampled([draw(Alone(person), mode, 16, number)], [mode], spread)
+        mean, covariance, _ = known.moments(spread)
+        away = mean[0, 0] - spread.mean[0]
+        slopes.append([away / 0.36, (away**2 + covariance[0, 0, 0]) / 0.36 - 1])
+        noise.append(np.diag(known.noise(spread)))
+    ratio = np.var(slopes, axis=0) / np.mean(noise, axis=0)
+    assert (ratio < 1.2).all(), "not too small"
+    assert (ratio > 0.02).all(), "nor much too large, by even nodes"
+
+
+def test_a_spread_stays_near_another():
+    other = Spread(np.array([1.0, 2.0]), np.array([0.1, 0.2]))
+    found = Spread(np.array([5.0, 2.1]), np.array([0.11, 0.001])).near(other, (1.0, 0.7))
+    assert found.mean == pytest.approx([1.1, 2.1])
+    assert found.scatter == pytest.approx([0.11, 0.2 * np.exp(-0.7)])

@@ -139,3 +139,12 @@ def test_broken_steps_are_refused(tmp_path, monkeypatch, change):
     Path("b.json").write_text(json.dumps(json.loads(Path("a.json").read_text()) | change))
     with pytest.raises(navirl_python.NavirlError, match=r"b\.json.* at steps"):
         read_json(Path("b.json"), "demonstrations")
+
+
+def test_a_file_of_version_1_is_edited_and_names_its_extraction(navirl):
+    shutil.copy(Path(__file__).parent / "version1" / "demonstrations.json", "old.json")
+    navirl("select", "old.json", "--cycle", "2", "-o", "second.json")
+    assert lines_of("second.json") == [
+        "navirl extract a.mcap b.mcap --gain --resolution 0.2 -o old.json",
+        "navirl select old.json --cycle 2 -o second.json",
+    ]

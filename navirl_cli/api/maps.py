@@ -1,6 +1,6 @@
 """Figures of one scene under a reward: policy, reward, soft value, most likely moves."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Unpack
 
 from navirl_cli.api.arguments import one_of, texts
@@ -8,9 +8,10 @@ from navirl_cli.api.calls import policy as policy_in
 from navirl_cli.api.given import AnyReward, PathLike
 from navirl_cli.api.page import PageOptions, drawn, own
 from navirl_cli.api.results import ScenePolicy
+from navirl_cli.arrays import FloatArray
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.figures.actions import draw_actions
-from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, likely_window
+from navirl_cli.figures.cells import CellOptions, draw_policy, draw_reward, sight_of
 from navirl_cli.figures.overlay import driven, overlays_of
 from navirl_cli.figures.values import draw_value
 
@@ -54,7 +55,7 @@ def policy(
     """
     view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
-    return drawn(lambda panels: draw_policy(panels[0], view.scene, view.visits_by_state, **options), own(axes), page)[0]
+    return _drawn(draw_policy, view, view.visits_by_state, options, axes, page)
 
 
 def reward(
@@ -73,8 +74,7 @@ def reward(
     """Draw the reward of every cell, with the nominal path (the paper's Fig. 8, right); arguments as :func:`policy`."""
     view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
-    by_cell = view.reward.by_cell(view.scene)
-    return drawn(lambda panels: draw_reward(panels[0], view.scene, by_cell, **options), own(axes), page)[0]
+    return _drawn(draw_reward, view, view.reward.by_cell(view.scene), options, axes, page)
 
 
 def value(
@@ -93,9 +93,7 @@ def value(
     """Draw the soft value of every cell with its contours; arguments as :func:`policy`."""
     view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
-    return drawn(
-        lambda panels: draw_value(panels[0], view.scene, view.policy.value_by_cell(), **options), own(axes), page
-    )[0]
+    return _drawn(draw_value, view, view.policy.value_by_cell(), options, axes, page)
 
 
 def actions(
@@ -114,13 +112,19 @@ def actions(
     """Draw the most likely move of every cell as an arrow; arguments as :func:`policy`."""
     view = policy_in(reward, demonstration, person=person)
     options = _cells(view, crop, overlay, samples, seed, demos)
-    return drawn(
-        lambda panels: draw_actions(
-            panels[0], view.scene, view.policy.probability_by_cell(view.scene.start), **options
-        ),
-        own(axes),
-        page,
-    )[0]
+    return _drawn(draw_actions, view, view.policy.probability_by_cell(view.scene.start), options, axes, page)
+
+
+def _drawn(
+    draw: Callable[..., object],
+    view: ScenePolicy,
+    by_state: FloatArray,
+    options: CellOptions,
+    axes: "Axes | None",
+    page: PageOptions,
+) -> "Axes":
+    """Draw one map of a scene, and give its axes."""
+    return drawn(lambda panels: draw(panels[0], view.scene, by_state, **options), own(axes), page)[0]
 
 
 def _cells(
@@ -137,6 +141,4 @@ def _cells(
     if wanted & {"demos", "all"}:
         shown, _ = driven(demos or [view.demonstration], view.demonstration, everywhere="all" in wanted)
     overlays = overlays_of(shown, view.sample(samples, seed=seed) if "samples" in wanted else ())
-    lines = [line for one in overlays for line in one.lines_m]
-    window = likely_window(view.scene, view.visits_by_state, lines) if crop else None
-    return {"robot_radius_m": view.demonstration.robot_radius_m, "window_m": window, "overlays": overlays}
+    return sight_of(view.scene, view.visits_by_state, view.demonstration.robot_radius_m, overlays, crop=crop)

@@ -66,24 +66,26 @@ def check_travel(xy_m: FloatArray) -> None:
 
 def check_start(people: FloatArray, start: FloatArray, radius_m: float) -> None:
     """Refuse a person within the robot at the start: the scene would have no path."""
-    for x, y in people:
-        distance = float(np.hypot(x - start[0], y - start[1]))
-        if distance < radius_m:
-            raise DemonstrationError(
-                f"a person at x {x:.2f} m, y {y:.2f} m stands on the path's start ({distance:.2f} m from the robot's "
-                f"centre, radius {radius_m:.2f} m); check `person`, the people topic's frame and `robot_radius`"
-            )
+    for x, y, distance in _within(people, start, radius_m):
+        raise DemonstrationError(
+            f"a person at x {x:.2f} m, y {y:.2f} m stands on the path's start ({distance:.2f} m from the robot's "
+            f"centre, radius {radius_m:.2f} m); check `person`, the people topic's frame and `robot_radius`"
+        )
 
 
 def check_end(people: FloatArray, end: FloatArray, radius_m: float, by: str) -> None:
     """Refuse a person whom the user places where the robot ended."""
-    for x, y in people:
-        distance = float(np.hypot(x - end[0], y - end[1]))
-        if distance < radius_m:
-            raise DemonstrationError(
-                f"{by} {x:.2f},{y:.2f} stands where the path ends, which is its goal ({distance:.2f} m from the "
-                f"robot's centre, radius {radius_m:.2f} m); correct the place"
-            )
+    for x, y, distance in _within(people, end, radius_m):
+        raise DemonstrationError(
+            f"{by} {x:.2f},{y:.2f} stands where the path ends, which is its goal ({distance:.2f} m from the "
+            f"robot's centre, radius {radius_m:.2f} m); correct the place"
+        )
+
+
+def _within(people: FloatArray, place: FloatArray, radius_m: float) -> list[tuple[float, float, float]]:
+    """x, y and distance, m, of the people who stand nearer to a place than a radius."""
+    distances = [float(np.hypot(x - place[0], y - place[1])) for x, y in people]
+    return [(x, y, distance) for (x, y), distance in zip(people, distances, strict=True) if distance < radius_m]
 
 
 def check_goal(grid: Grid, start: FloatArray, goal: tuple[float, float]) -> None:

@@ -174,6 +174,23 @@ def likely_window(scene: Scene, visits: FloatArray, lines_m: Sequence[FloatArray
     return cropped_to([scene.lattice.grid], np.concatenate([likely, *lines_m]), scene.people_m)
 
 
+def sight_of(
+    scene: Scene, visits: FloatArray, robot_radius_m: float, overlays: Sequence[Overlay], *, crop: bool
+) -> CellOptions:
+    """Options that all figures of a scene share, so that cropped ones have the same view.
+
+    Args:
+        scene: The scene.
+        visits: (n,) expected visits by state.
+        robot_radius_m: Radius of the robot, m.
+        overlays: Paths over the map.
+        crop: Show only where the policy leads, and the overlays.
+    """
+    lines = [line for one in overlays for line in one.lines_m]
+    window = likely_window(scene, visits, lines) if crop else None
+    return {"robot_radius_m": robot_radius_m, "window_m": window, "overlays": overlays}
+
+
 def shown_states(scene: Scene, window: Window) -> BoolArray:
     """(n,) cells within a window; all cells if none is."""
     shown = inside(window, scene.lattice.xy_m)

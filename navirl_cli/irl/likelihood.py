@@ -68,6 +68,11 @@ def log_likelihood(evidence: Evidence, reward: Reward) -> float:
     return sum(evidence.by_block(_log_likelihood, reward))
 
 
+def log_likelihoods(evidence: Evidence, reward: Reward) -> FloatArray:
+    """(demonstrations,) log-likelihood of each alone, without derivatives."""
+    return np.asarray(np.sum(evidence.by_block(_log_likelihoods, (reward, evidence.count)), axis=0))
+
+
 def value_and_gradient(evidence: Evidence, reward: Reward) -> tuple[float, FloatArray]:
     """Log-likelihood and (k,) gradient at the lowest cost: one solve for the value and one for the visits.
 
@@ -155,6 +160,16 @@ def _log_likelihood(block: Block, reward: Reward) -> float:
     for part in block:
         jet, policy, steps = _solved(part, reward)
         total += float(steps.values(jet, policy).sum())
+    return total
+
+
+def _log_likelihoods(block: Block, asked: tuple[Reward, int]) -> FloatArray:
+    """:func:`log_likelihoods` of a block, by reward and number of demonstrations."""
+    reward, count = asked
+    total = np.zeros(count)
+    for part in block:
+        jet, policy, steps = _solved(part, reward)
+        total += np.bincount(part.owner, steps.values(jet, policy), minlength=count)
     return total
 
 

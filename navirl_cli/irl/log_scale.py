@@ -1,13 +1,14 @@
 """Parameters of a reward by the logarithms of their magnitudes, on which people are scattered."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.irl.evidence import Evidence
-from navirl_cli.irl.likelihood import likelihood, log_likelihood
+from navirl_cli.irl.likelihood import likelihood, log_likelihood, log_likelihoods
 from navirl_cli.irl.newton import Point
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward
@@ -97,3 +98,49 @@ class Witness:
             return log_likelihood(self.evidence, reward) + self.prior.log_density(np.array(reward.theta))
         except InfinitePartitionError:
             return -np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Company(ByContent):
+    """What the demonstrations of several people in the same scenes say: one policy a scene serves all."""
+
+    #: (k,) numbers of the people, and of (demonstrations,) each the person, as a place among these; -1 for others.
+    members: IntArray
+    whose: IntArray
+    #: Of these people.
+    evidence: Evidence
+    scale: LogScale
+    #: Of each of them, as of a :class:`Witness`.
+    prior: Prior
+
+    def values(self, y: FloatArray) -> FloatArray:
+        """(k,) log-likelihoods as of each :class:`Witness` alone."""
+        low, high = self.scale.bounds
+        if (y < low).any() or (y > high).any():
+            return np.full(len(self.members), -np.inf)
+        reward = self.scale.at(y)
+        try:
+            every = log_likelihoods(self.evidence, reward)
+        except InfinitePartitionError:
+            return np.full(len(self.members), -np.inf)
+        own = np.bincount(self.whose + 1, every, minlength=len(self.members) + 1)[1:]
+        return np.asarray(own + self.prior.log_density(np.array(reward.theta)), dtype=float)
+
+
+def companies(evidence: Evidence, witnesses: Sequence[Witness]) -> list[Company]:
+    """People by the scenes in which they demonstrated; all have the same scale and prior.
+
+    Args:
+        evidence: Of all of them.
+        witnesses: Each of them.
+    """
+    together: dict[frozenset[int], list[int]] = {}
+    for number, one in enumerate(witnesses):
+        together.setdefault(frozenset(id(part.scene) for part in one.evidence.scenes), []).append(number)
+    found = []
+    for numbers in together.values():
+        place = {witnesses[number].name: k for k, number in enumerate(numbers)}
+        whose = np.array([place.get(name, -1) for name in evidence.participants])
+        own = evidence.repeated((whose >= 0).astype(int))
+        found.append(Company(np.array(numbers), whose, own, witnesses[0].scale, witnesses[0].prior))
+    return found

@@ -1,6 +1,6 @@
 """The posterior of scatters, mean and people together, by places of the scatters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -115,6 +115,20 @@ class Mixture(ByContent):
         moved = np.abs(mean - other.typical()[0]) / np.sqrt(np.diag(covariance))
         return float(np.maximum(moved, np.abs(scatter - other.weight @ other.scatter) / error).max())
 
+    def errors(self, noise: FloatArray) -> FloatArray:
+        """(2v,) errors of the means and of the logarithms of the scatters, in their standard deviations.
+
+        Args:
+            noise: (2v, 2v) covariance of the error in the slope of the log-likelihood, by the same.
+        """
+        v = self.mean.shape[1]
+        x = np.concatenate([self.mean, np.log(self.scatter)], axis=1)
+        away = x - self.weight @ x
+        covariance = (away * self.weight[:, None]).T @ away
+        covariance[:v, :v] += np.einsum("h,hij->ij", self.weight, self.covariance)
+        squared = np.diag(covariance @ noise @ covariance) / np.diag(covariance)
+        return np.asarray(np.sqrt(squared))
+
     def typical(self) -> tuple[FloatArray, FloatArray]:
         """(v,) mean over people, and its (v, v) covariance."""
         mean = self.weight @ self.mean
@@ -157,7 +171,7 @@ def _best_mean(objective: Restricted, start: Spread) -> _Place:
     spread, unit = start, np.outer(start.scatter, start.scatter)
     for _ in range(MEAN_STEPS):
         own, covariance, _ = objective.people.moments(spread)
-        slope = ((own - spread.mean) / spread.scatter**2).sum(axis=0)
+        slope = objective.slope(own, spread)
         values, basis = np.linalg.eigh(objective.information(covariance, spread) * unit)
         if values[0] < LEAST_INFORMATION * len(own):
             return _Place(spread, np.zeros_like(unit), -np.inf)
@@ -172,7 +186,7 @@ def _best_mean(objective: Restricted, start: Spread) -> _Place:
 def excluded(objective: Restricted, start: Spread) -> BoolArray:
     """(v,) whether the restricted likelihood excludes that a scatter is zero, at 5 %."""
     v = len(start.mean)
-    plain = Restricted(objective.people, objective.width, jacobian=False)
+    plain = replace(objective, jacobian=False)
     top = climbed(plain, start)
     found = np.zeros(v, dtype=bool)
     for j in range(v):

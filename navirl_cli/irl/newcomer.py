@@ -9,7 +9,7 @@ from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit, fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.log_scale import LogScale, Witness
-from navirl_cli.irl.nodes import draw, laplace, sampled
+from navirl_cli.irl.nodes import Alone, draw, laplace, sampled
 from navirl_cli.irl.population import person_of
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.spread import Spread
@@ -58,7 +58,7 @@ def newcomer(evidence: Evidence, others: Others, name: str, plain: Fit | None = 
     one = Witness(name, evidence, scale, prior)
     known = laplace(one, spread, spread.mean)
     for number in range(DRAWS):
-        known = sampled([draw(one, known, number=number)], spread).posteriors(spread)[0]
+        known = sampled([draw(Alone(one), known, number=number)], [known], spread).posteriors(spread)[0]
     person = person_of(one, known.mean, known.covariance, known, scale.reward)
     varying = scale.varying
     covariance = np.full_like(person.covariance, np.nan)

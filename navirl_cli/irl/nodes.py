@@ -1,7 +1,8 @@
 """What is known of one person under a spread: by the mode of the posterior (Laplace), and by importance sampling.
 
-Nodes are drawn from Student's distribution around an approximation, and again around a better one. All of them count,
-by the mixture of the densities.
+Nodes are drawn from Student's distribution around an approximation, and again around better ones. All of them count,
+by the mixture of the densities. People who were in the same scenes share their nodes: one policy says how likely the
+paths of each are.
 """
 
 from collections.abc import Sequence
@@ -10,15 +11,15 @@ from typing import Protocol
 
 import numpy as np
 
-from navirl_cli.arrays import ByContent, FloatArray
+from navirl_cli.arrays import ByContent, FloatArray, IntArray
 from navirl_cli.errors import RewardError
 from navirl_cli.irl.newton import Effort, Point, maximise
-from navirl_cli.irl.sampled import Sampled
+from navirl_cli.irl.sampled import Sampled, Shared
 from navirl_cli.irl.spread import Factors, Posterior, Spread
 
-#: Largest number of pairs of nodes of a person, on either side of the mode. Degrees of freedom of their distribution,
-#: whose tails are heavier than those of any posterior under a normal scatter.
-MOST_PAIRS, FREEDOM = 64, 6.0
+#: Pairs of nodes of a person in a draw, on either side of the mode. Degrees of freedom of their distribution, whose
+#: tails are heavier than those of any posterior under a normal scatter.
+PAIRS, FREEDOM = 64, 6.0
 #: Even numbers keep away from 0 and 1 by this.
 TINY = 1e-6
 #: A mode is found where the next step is expected to gain less, nats.
@@ -41,15 +42,45 @@ class Likely(Protocol):
         """The value alone."""
 
 
+class Group(Protocol):
+    """People of whom one evaluation gives all log-likelihoods."""
+
+    @property
+    def members(self) -> IntArray:
+        """(k,) their numbers."""
+
+    def values(self, y: FloatArray) -> FloatArray:
+        """(k,) log-likelihoods at (v,) y."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """One person as a group."""
+
+    person: Likely
+    number: int = 0
+
+    @property
+    def members(self) -> IntArray:
+        """(1,) the number."""
+        return np.array([self.number])
+
+    def values(self, y: FloatArray) -> FloatArray:
+        """(1,) log-likelihood."""
+        return np.array([self.person.value(y)])
+
+
 @dataclass(frozen=True, eq=False)
 class Nodes(ByContent):
-    """Places around a person's mode, with the person's log-likelihood."""
+    """Places with the log-likelihoods of a group."""
 
-    #: (d, v) and (d,).
+    #: (k,), (d, v) and (k, d).
+    members: IntArray
     y: FloatArray
     value: FloatArray
-    #: The approximations around which they were drawn, as many from each.
+    #: The approximations around which they were drawn, and how many from each.
     around: tuple[Posterior, ...]
+    counts: tuple[int, ...]
 
     @property
     def density(self) -> FloatArray:
@@ -57,25 +88,33 @@ class Nodes(ByContent):
 
         So that a few draws around a bad approximation do no harm (Veach and Guibas 1995, Proc. SIGGRAPH, 419).
         """
-        logs = np.array([_log_density(one, self.y) for one in self.around])
-        found: FloatArray = np.logaddexp.reduce(logs, axis=0) - np.log(len(logs))
+        share = np.array(self.counts) / len(self.y)
+        logs = np.array([_log_density(one, self.y) for one in self.around]) + np.log(share)[:, None]
+        found: FloatArray = np.logaddexp.reduce(logs, axis=0)
         return found
 
-    def and_also(self, others: "Nodes") -> "Nodes":
-        """These and others of the same person."""
-        y, value = np.concatenate([self.y, others.y]), np.concatenate([self.value, others.value])
-        return Nodes(y, value, self.around + others.around)
+    @staticmethod
+    def together(some: Sequence["Nodes"]) -> "Nodes":
+        """All nodes of one group."""
+        return Nodes(
+            some[0].members,
+            np.concatenate([one.y for one in some]),
+            np.concatenate([one.value for one in some], axis=1),
+            tuple(around for one in some for around in one.around),
+            tuple(count for one in some for count in one.counts),
+        )
 
 
-def sampled(people: Sequence[Nodes], spread: Spread) -> Sampled:
-    """All people by their nodes.
+def sampled(groups: Sequence[Nodes], around: Sequence[Posterior], spread: Spread) -> Sampled:
+    """All people by the nodes of their groups.
 
     Args:
-        people: As many nodes of each.
-        spread: Under which the last approximations hold; they are the Gaussian stand-ins.
+        groups: Every person is in one.
+        around: Approximations of everybody, for the Gaussian stand-ins.
+        spread: Under which these hold.
     """
-    y, value, density = (np.array([getattr(one, name) for one in people]) for name in ("y", "value", "density"))
-    return Sampled(y, value, density, Factors.of([one.around[-1] for one in people], spread))
+    blocks = tuple(Shared(one.members, one.y, one.value, one.density) for one in groups)
+    return Sampled(blocks, Factors.of(around, spread))
 
 
 def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
@@ -105,17 +144,17 @@ def laplace(person: Likely, spread: Spread, start: FloatArray) -> Posterior:
     return Posterior(best.x, covariance, best.value + area, np.nan, 0)
 
 
-def draw(person: Likely, around: Posterior, pairs: int = MOST_PAIRS, number: int = 0) -> Nodes:
-    """Nodes around an approximation of a posterior, with the person's log-likelihood.
+def draw(group: Group, around: Posterior, pairs: int = PAIRS, number: int = 0) -> Nodes:
+    """Nodes around an approximation of a posterior, with the log-likelihoods of a group.
 
     Args:
-        person: The log-likelihood.
-        around: The approximation.
+        group: The people.
+        around: The approximation, for one of them.
         pairs: Of nodes.
         number: Of the draw, so that errors of several people or draws are independent.
     """
     y = scattered(around, pairs, number)[0]
-    return Nodes(y, np.array([person.value(one) for one in y]), (around,))
+    return Nodes(group.members, y, np.array([group.values(one) for one in y]).T, (around,), (len(y),))
 
 
 def scattered(around: Posterior, pairs: int, number: int) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,7 @@ from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import Fit
 from navirl_cli.irl.intervals import LEVEL, Ends, Errors, Intervals, Kind
 from navirl_cli.irl.likelihood import log_likelihood
-from navirl_cli.irl.log_scale import LogScale, Witness
+from navirl_cli.irl.log_scale import LogScale, Witness, companies
 from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.random_effects import RandomEffects, random_effects
 from navirl_cli.irl.reward import Reward
@@ -119,7 +119,8 @@ def population(
     # Everybody has a share of the regulariser, so that together they have all of it.
     share = Prior.l2(pooled.reward.parameters, pooled.l2 / len(names))
     people = [Witness(name, _of(evidence, name), scale, share) for name in names]
-    found = random_effects(people, scale.of(pooled.reward), executor=executor, progress=progress)
+    groups = companies(evidence, people)
+    found = random_effects(people, scale.of(pooled.reward), groups=groups, executor=executor, progress=progress)
     known = found.mixture
     mean, covariance = known.typical()
     persons = [

@@ -12,23 +12,23 @@ and Thompson 1971, Biometrika 58:545), which takes into account that m is estima
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from math import cbrt, ceil
 
 import numpy as np
 
 from navirl_cli.arrays import BoolArray, ByContent, FloatArray
 from navirl_cli.irl.mixture import Mixture, excluded
-from navirl_cli.irl.nodes import MOST_PAIRS, Likely, Nodes, draw, laplace, sampled
+from navirl_cli.irl.nodes import PAIRS, Alone, Group, Likely, Nodes, draw, laplace, sampled
 from navirl_cli.irl.restricted import REACH, WIDTH, Restricted, best_spread
-from navirl_cli.irl.sampled import Sampled
-from navirl_cli.irl.spread import Factors, Posterior, Spread
+from navirl_cli.irl.spread import Factors, Known, Posterior, Spread
 from navirl_cli.parallel import map_in_order
 
 #: Scatter at which the search starts.
 FIRST = 0.2
-#: Pairs of nodes of all people together, and the least number of a person, in a draw.
-PAIRS, FEWEST_PAIRS = 600, 48
 #: Largest numbers of rounds with modes, and of draws of nodes.
-MODE_ROUNDS, DRAWS = 8, 4
+MODE_ROUNDS, DRAWS = 8, 6
+#: The first two draws are of PAIRS; a later one is as large as the error that is left asks for, within these multiples.
+SMALLEST, LARGEST = 0.5, 2.0
 #: Least curvature assumed for the distribution of the logarithms of scatters.
 FLATTEST = 0.5
 #: A round with modes that moves the spread by less, in standard errors, is the last one.
@@ -36,8 +36,8 @@ SMALL = 0.2
 #: Nodes are drawn for a scatter so much wider than the one found, because the true one may be.
 WIDER = 1.5
 #: The search has converged where another draw of nodes moves means and scatters by less than so many standard
-#: deviations, and at least so many places of the scatters count.
-AGREES, FEWEST_PLACES = 0.3, 20.0
+#: deviations, the nodes leave an error of less than so many, and at least so many places of the scatters count.
+AGREES, PRECISE, FEWEST_PLACES = 0.3, 0.1, 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +67,7 @@ def random_effects(
     people: Sequence[Likely],
     start: FloatArray,
     *,
+    groups: Sequence[Group] | None = None,
     width: float = WIDTH,
     executor: Executor | None = None,
     progress: Callable[[int, float], None] | None = None,
@@ -75,12 +76,15 @@ def random_effects(
 
     Args:
         people: Their log-likelihoods; at least two.
-        start: (v,) where the search starts.
-        width: Of the weak prior of the scatters.
+        start: (v,) where the search starts, and the mean is expected.
+        groups: The same people, each in one group of those who share nodes; by default everybody alone.
+        width: Of the weak priors.
         executor: Where to compute; by default local processes.
         progress: Called with the number of rounds and the marginal log-likelihood.
     """
-    search = _Search(people, Spread(start, np.full(len(start), FIRST)), width, executor, progress)
+    if groups is None:
+        groups = [Alone(one, number) for number, one in enumerate(people)]
+    search = _Search(people, groups, Spread(start, np.full(len(start), FIRST)), width, executor, progress)
     search.by_modes()
     return search.by_nodes()
 
@@ -90,23 +94,23 @@ class _Search:
     """Rounds of modes, and of draws of nodes."""
 
     people: Sequence[Likely]
+    groups: Sequence[Group]
     spread: Spread
     width: float
     executor: Executor | None
     progress: Callable[[int, float], None] | None
 
     def __post_init__(self) -> None:
-        self.modes = [self.spread.mean for _ in self.people]
+        self.start = self.spread.mean
+        self.modes = [self.start for _ in self.people]
         self.places: list[tuple[FloatArray, float]] = []
-        #: Number of draws of nodes, and the spread under which the last one was.
-        self.drawn, self.under = 0, self.spread
 
     def by_modes(self) -> None:
         """Rounds with Laplace's approximation, to come near."""
         for _ in range(MODE_ROUNDS):
             posteriors = self._laplace(self.spread)
             self.factors = Factors.of(posteriors, self.spread)
-            top = best_spread(Restricted(self.factors, self.width), self.spread, reach=REACH)
+            top = best_spread(self._over(self.factors), self.spread, reach=REACH)
             values, basis = np.linalg.eigh(-top.hessian)
             errors = np.sqrt((basis**2 / np.maximum(values, FLATTEST)).sum(axis=1))
             moved = float(np.abs((top.x - self.spread.x) / errors).max())
@@ -116,39 +120,50 @@ class _Search:
                 break
 
     def by_nodes(self) -> RandomEffects:
-        """Draws of nodes until one more changes little."""
-        mixture, nodes = Mixture.of(Restricted(self.factors, self.width), self.spread), list[Nodes]()
+        """Draws of nodes until they leave little error, and one more changes little."""
+        mixture = Mixture.of(self._over(self.factors), self.spread)
+        # Nodes say nothing far from where they were drawn, so that the spread of the next ones must be near.
+        center, nodes = mixture.spread.near(self.spread, REACH), list[list[Nodes]]()
+        around, size, total = self._laplace(center.wider(WIDER)), 1.0, 0.0
         for number in range(DRAWS):
-            before, wide = mixture, mixture.spread.wider(WIDER)
-            nodes, known = self._more(nodes, wide)
-            mixture = Mixture.of(Restricted(known, self.width), before.spread)
+            before = mixture
+            nodes.append(self._drawn(around, number, size))
+            known = sampled([Nodes.together(own) for own in zip(*nodes, strict=True)], around, center.wider(WIDER))
+            mixture = Mixture.of(self._over(known), center)
             self.spread = mixture.middle
             posteriors = known.posteriors(self.spread)
             self._note(self.spread.mean, posteriors)
-            converged = number > 0 and mixture.away(before) < AGREES and mixture.effective > FEWEST_PLACES
+            error = float(mixture.errors(known.noise(self.spread)).max()) / PRECISE
+            converged = number > 0 and error < 1 and mixture.away(before) < AGREES and mixture.effective > FEWEST_PLACES
             if converged:
                 break
+            center = mixture.spread.near(center, REACH)
+            around, total = known.posteriors(center.wider(WIDER)), total + size
+            # Errors fall with the root of the number; after one draw the error itself is not known.
+            size = min(max(total * (error**2 - 1), SMALLEST), LARGEST) if number > 0 else 1.0
         return RandomEffects(
             mixture=mixture,
             spread=self.spread,
             people=tuple(posteriors),
-            differ=excluded(Restricted(known, self.width), self.spread),
+            differ=excluded(self._over(known), self.spread),
             path=np.array([place for place, _ in self.places]),
             path_log_likelihood=np.array([value for _, value in self.places]),
             converged=converged,
         )
 
-    def _more(self, nodes: list[Nodes], spread: Spread) -> tuple[list[Nodes], Sampled]:
-        """Everybody's nodes and new ones, drawn under a spread; and people by them."""
-        around = sampled(nodes, self.under).posteriors(spread) if nodes else self._laplace(spread)
-        count = len(self.people)
-        pairs = min(max(PAIRS // count, FEWEST_PAIRS), MOST_PAIRS)
-        start = self.drawn * count
-        jobs = [(*one, pairs, start + k) for k, one in enumerate(zip(self.people, around, strict=True))]
-        drawn = list(map_in_order(_draw, jobs, self.executor))
-        self.drawn, self.under = self.drawn + 1, spread
-        every = [one.and_also(new) for one, new in zip(nodes, drawn, strict=True)] if nodes else drawn
-        return every, sampled(every, spread)
+    def _drawn(self, around: Sequence[Posterior], number: int, size: float) -> list[Nodes]:
+        """New nodes of every group, around the approximations of its members."""
+        jobs, count = [], len(self.people)
+        for group in self.groups:
+            # Nodes around one member serve the others.
+            each = ceil(size * PAIRS / cbrt(len(group.members)))
+            jobs += [(group, around[one], each, number * count + int(one)) for one in group.members]
+        drawn = map_in_order(_draw, jobs, self.executor)
+        return [Nodes.together([next(drawn) for _ in group.members]) for group in self.groups]
+
+    def _over(self, people: Known) -> Restricted:
+        """The restricted likelihood of people."""
+        return Restricted(people, self.start, self.width)
 
     def _laplace(self, spread: Spread) -> list[Posterior]:
         found = [laplace(one, spread, mode) for one, mode in zip(self.people, self.modes, strict=True)]
@@ -162,6 +177,6 @@ class _Search:
             self.progress(len(self.places), self.places[-1][1])
 
 
-def _draw(job: tuple[Likely, Posterior, int, int]) -> Nodes:
+def _draw(job: tuple[Group, Posterior, int, int]) -> Nodes:
     """Nodes around an approximation; importable by name, to run in another process."""
     return draw(*job)

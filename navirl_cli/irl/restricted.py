@@ -3,7 +3,7 @@
 It takes into account that the mean is estimated too: the plain likelihood finds people too much alike.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from navirl_cli.irl.newton import Point, maximise
 from navirl_cli.irl.spread import Factors, Known, Posterior, Spread
 
 #: A scatter (standard deviation of a logarithm) is weakly held by half a normal distribution of this width: that most
-#: people differ by more than a factor of three in a parameter is not expected.
-WIDTH = 0.5
+#: people differ by more than a factor of three in a parameter is not expected. A mean is held by a normal distribution
+#: so many times as wide around where the search starts: it stays finite where no path shows that it is above zero.
+WIDTH, MEAN_TIMES = 0.5, 3.0
 #: Bounds of a scatter. At the lower one it counts as zero.
 LEAST, MOST = 0.01, 3.0
 #: Largest move of a round: of the mean in scatters, of the logarithm of a scatter. Farther away the Gaussian stand-ins
@@ -25,12 +26,14 @@ DELTA = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Restricted:
-    """The restricted log-likelihood of mean and log scatters, with the weak prior of the scatters.
+    """The restricted log-likelihood of mean and log scatters, with the weak priors of both.
 
     Value and information hold for all people whose moments are known, the derivatives for Gaussian likelihoods.
     """
 
     people: Known
+    #: (v,) where means are expected.
+    center: FloatArray
     width: float = WIDTH
     #: As a density of the logarithms of the scatters, or of the scatters.
     jacobian: bool = True
@@ -41,18 +44,28 @@ class Restricted:
         sign, size = np.linalg.slogdet(self.information(covariance, spread))
         return float(logs.sum()) - 0.5 * float(size) + self._prior(spread) if sign > 0 else -np.inf
 
+    @property
+    def firmness(self) -> float:
+        """Precision with which a mean is held."""
+        return (MEAN_TIMES * self.width) ** -2
+
+    def slope(self, mean: FloatArray, spread: Spread) -> FloatArray:
+        """(v,) gradient by the mean, by the people's (n, v) posterior means."""
+        pull = ((mean - spread.mean) / spread.scatter**2).sum(axis=0)
+        found: FloatArray = pull - self.firmness * (spread.mean - self.center)
+        return found
+
     def _prior(self, spread: Spread) -> float:
-        """Log density of the scatters, up to a constant."""
+        """Log density of mean and scatters, up to a constant."""
         held = -0.5 * float(((spread.scatter / self.width) ** 2).sum())
+        held -= 0.5 * self.firmness * float(((spread.mean - self.center) ** 2).sum())
         return held + (float(np.log(spread.scatter).sum()) if self.jacobian else 0.0)
 
-    @staticmethod
-    def information(covariance: FloatArray, spread: Spread) -> FloatArray:
+    def information(self, covariance: FloatArray, spread: Spread) -> FloatArray:
         """(v, v) observed information of the mean at given scatters, by the people's (n, v, v) covariances."""
         precision = 1.0 / spread.scatter**2
-        found: FloatArray = len(covariance) * np.diag(precision) - np.outer(precision, precision) * covariance.sum(
-            axis=0
-        )
+        lost = np.outer(precision, precision) * covariance.sum(axis=0)
+        found: FloatArray = np.diag(len(covariance) * precision + self.firmness) - lost
         return found
 
     def __call__(self, x: FloatArray) -> Point:
@@ -69,6 +82,8 @@ class Restricted:
         squared = (spread.scatter / self.width) ** 2
         gradient[v:] += self.jacobian - squared
         hessian[v:, v:] -= np.diag(2 * squared)
+        gradient[:v] -= self.firmness * (spread.mean - self.center)
+        hessian[:v, :v] -= self.firmness * np.eye(v)
         return Point(
             x,
             value - lost + self._prior(spread),
@@ -139,7 +154,7 @@ def climbed(objective: Restricted, start: Spread, fixed: int | None = None) -> S
     for _ in range(ROUNDS):
         mean, covariance, log = objective.people.moments(start)
         factors = Factors.of([Posterior(*one, np.nan, 0) for one in zip(mean, covariance, log, strict=True)], start)
-        standing = Restricted(factors, objective.width, objective.jacobian)
+        standing = replace(objective, people=factors)
         start = Spread.at(best_spread(standing, start, fixed, REACH).x)
         best = max(best, start, key=objective.value)
     return best

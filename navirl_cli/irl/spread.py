@@ -31,6 +31,12 @@ class Spread(ByContent):
         """With so many times the scatter."""
         return Spread(self.mean, times * self.scatter)
 
+    def near(self, other: "Spread", reach: tuple[float, float]) -> "Spread":
+        """As near as possible to this one, within so many scatters and a difference of their logarithms of another."""
+        away = reach[0] * other.scatter
+        mean = np.clip(self.mean, other.mean - away, other.mean + away)
+        return Spread(mean, other.scatter * np.exp(np.clip(np.log(self.scatter / other.scatter), -reach[1], reach[1])))
+
     def log_density(self, y: FloatArray) -> FloatArray:
         """(...) log density at (..., v) y."""
         away = (y - self.mean) / self.scatter

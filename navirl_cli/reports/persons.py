@@ -5,16 +5,19 @@ from typing import Any
 
 from navirl_cli.documents.document import Block, Paragraph
 from navirl_cli.documents.tables import Column, Interval, Table
-from navirl_cli.irl.random_effects import AGREES
+from navirl_cli.irl.random_effects import AGREES, PRECISE
 from navirl_cli.irl.status import Status
 
 #: With fewer effective draws a person's numbers are rough.
 FEW_DRAWS = 20
 _ENDED = {
-    Status.CONVERGED: f"another draw moves the typical reward and the scatters by less than {AGREES:g} standard errors",
+    Status.CONVERGED: (
+        f"another draw moves the typical reward and the scatters by less than {AGREES:g} standard errors, and all draws "
+        f"leave an error of less than {PRECISE:g}"
+    ),
     Status.STOPPED_EARLY: (
-        f"draws still move the typical reward or the scatters by more than {AGREES:g} standard errors: all numbers are "
-        "approximate; more demonstrations of each person help"
+        f"a draw still moves the typical reward or the scatters by more than {AGREES:g} standard errors, or all draws "
+        f"leave an error of more than {PRECISE:g}: all numbers are approximate; more demonstrations of each person help"
     ),
 }
 

@@ -66,13 +66,10 @@ class Sight:
 
     @property
     def options(self) -> "CellOptions":
-        """Common options of all figures of the scene; cropped figures have the same view."""
-        from navirl_cli.figures.cells import likely_window
+        """Common options of all figures of the scene."""
+        from navirl_cli.figures.cells import sight_of
 
-        overlays = self._overlays()
-        lines = [line for one in overlays for line in one.lines_m]
-        window = likely_window(self.scene, self.visits, lines) if self.crop else None
-        return {"robot_radius_m": self.one.robot_radius_m, "window_m": window, "overlays": overlays}
+        return sight_of(self.scene, self.visits, self.one.robot_radius_m, self._overlays(), crop=self.crop)
 
     def _overlays(self) -> list["Overlay"]:
         """Paths to draw over the map, driven ones below."""
