@@ -144,3 +144,9 @@ def test_the_scene_is_one_that_the_reward_was_learnt_from(navirl, tmp_path):
     assert "--cycle goes with --scene DEMOS." in navirl("plan", "r.json", "--cycle", "2", code=2).stderr
     message = navirl(*words, "--cycle", "4", code=1).stderr
     assert "--cycle: expected one of '1', '2', found '4'" in message
+
+
+def test_some_and_all_are_refused_by_every_command(navirl):
+    for words in (["ranks"], ["properties"], ["compare", "--reward", "x.json"], ["policy"]):
+        given = ["plot", *words, "demos.json", "--reward", "r.json", "--all", "--cycle", 1, "-o", "x.png"]
+        assert "--all takes all demonstrations; leave out --cycle" in navirl(*given, code=2).stderr

@@ -163,6 +163,7 @@ def test_the_figure_and_the_recommendation(scene, tmp_path, monkeypatch):
         (["--scene", "DEMOS", "--goal", "1,2"], 2, "--scene gives map, people, start and goal"),
         (["--at", "3"], 2, "--at goes with --log."),
         (["--scene", "DEMOS", "--count", "3"], 2, "--count goes with --mode sample."),
+        (["--scene", "DEMOS", "--seed", "3"], 2, "--seed goes with --mode sample or --recommend."),
         (["--scene", "DEMOS", "--tolerance", "0.1"], 2, "--tolerance goes with --smooth."),
         (["--map", "m.yaml", "--start", "1,2,3,4", "--goal", "1,2"], 2, "expected two or three finite numbers"),
         (["--scene", "DEMOS:p9/9"], 1, "trial: expected one of 'p01/1'"),

@@ -134,6 +134,8 @@ class TestCommands:
         monkeypatch.setattr(registry, "_taken", {})
         with pytest.raises(ArtefactError, match=r"reward\.json: term: .*found 'egg'.*NAVIRL_TERMS=my_term\.py:MyTerm"):
             read_reward(Path("reward.json"))
+        assert "reward.json: term: expected one of" in navirl("info", "reward.json", code=1).stderr
+        assert float(navirl("info", "reward.json", "--field", "parameters.c0").stdout) < 0
         monkeypatch.setenv("NAVIRL_TERMS", "my_term.py:Egg")
         navirl("evaluate", "demos.json", "--reward", "reward.json", "--samples", 10)
 

@@ -216,3 +216,8 @@ def test_a_bad_questionnaire_is_refused_before_the_work(navirl, tmp_path):
     result = navirl("study", *LOGS, "-o", "out", "--questionnaire", "answers.csv", code=1)
     assert "answers.csv" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_levels_without_answers_are_refused(navirl):
+    stderr = navirl("study", *LOGS, "-o", "out", "--levels", 7, code=2).stderr
+    assert "--levels goes with --questionnaire." in stderr

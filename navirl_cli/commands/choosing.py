@@ -14,7 +14,7 @@ from navirl_cli.commands.types import Choice, Count
 from navirl_cli.commands.usage import Function, section
 from navirl_cli.demos.demonstration import Condition, Demonstration
 from navirl_cli.demos.subset import Subset
-from navirl_cli.evaluation.choice import choose
+from navirl_cli.evaluation.choice import check_choice, choose
 
 #: click's names of the options of :func:`choice_options`.
 NAMES = ("conditions", "cycles", "sets", "participants", "trials", "everything")
@@ -93,6 +93,7 @@ def choice_options(
             **others: Any,
         ) -> Any:
             subset = Subset(conditions, cycles, sets, participants, trials)
+            check_choice(subset, everything=everything)
             return function(choosing=Choosing(subset, everything), **others)
 
         chosen = section(title, *_OPTIONS, *([_TRIAL] if trial else []), *([_ALL] if reward else []))

@@ -7,6 +7,7 @@ import click
 
 from navirl_cli.artefacts.joined import read_content
 from navirl_cli.artefacts.manifest import manifest_path
+from navirl_cli.artefacts.rewards import learnt_of
 from navirl_cli.artefacts.store import read_any
 from navirl_cli.commands.shared import echo, echo_json, json_option, say
 from navirl_cli.commands.types import FilePath
@@ -54,4 +55,6 @@ def info(files: tuple[Path, ...], field: str | None, as_json: bool) -> None:
     elif as_json:
         echo_json(summary)
     else:
+        if artefact == "reward":
+            learnt_of(content, str(files[0]))  # names the file of a term that is not known here
         echo(to_text(info_report(", ".join(map(str, files)), artefact, content)))

@@ -20,7 +20,7 @@ from navirl_cli.commands.shared import (
     seed_option,
 )
 from navirl_cli.commands.types import Choice, Count, FilePath, Number, OutputPath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, refuse_unused, section
 from navirl_cli.files import Input
 
 if TYPE_CHECKING:
@@ -117,6 +117,7 @@ def plan(
 
     where = Place(**place)
     _check_arguments(where, mode, count, tolerance, smooth=smooth)
+    refuse_unused("--mode sample or --recommend", "seed", used=mode == Mode.SAMPLE.value or recommend)
     inputs = [reward, *where.files()]
     for path in (output, figure):
         if path is not None:

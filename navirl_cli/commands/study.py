@@ -34,7 +34,7 @@ from navirl_cli.commands.shared import (
     workers_options,
 )
 from navirl_cli.commands.types import Count, FilePath
-from navirl_cli.commands.usage import Command, Example, section
+from navirl_cli.commands.usage import Command, Example, refuse_unused, section
 from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.extract import Extraction, ExtractSettings
 from navirl_cli.demos.recordings import extract_recordings
@@ -108,6 +108,7 @@ def study(
     from navirl_cli.study.questionnaire import read_answers, shares
     from navirl_cli.study.unseen import pooled_policy
 
+    refuse_unused("--questionnaire", "levels", used=questionnaire is not None)
     answers = [] if questionnaire is None else read_answers(questionnaire, levels)
     bars = shares(answers, levels)
     _check_files(output, [*logs, *filter(None, [questionnaire])], force=force)

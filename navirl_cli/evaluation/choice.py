@@ -18,6 +18,16 @@ class Chosen:
     note: str = ""
 
 
+def check_choice(subset: Subset, *, everything: bool) -> None:
+    """Refuse a choice of some and all demonstrations.
+
+    Raises:
+        ArgumentError: Both are named.
+    """
+    if everything and subset.names:
+        raise ArgumentError(f"`all` takes all demonstrations; leave out `{next(iter(subset.names))}`")
+
+
 def choose(
     demonstrations: Sequence[Demonstration],
     subset: Subset,
@@ -39,8 +49,7 @@ def choose(
         ArgumentError: The user names some and all.
         DemonstrationError: As of :meth:`Subset.of`.
     """
-    if everything and subset.names:
-        raise ArgumentError(f"`all` takes all demonstrations; leave out `{next(iter(subset.names))}`")
+    check_choice(subset, everything=everything)
     if subset.names:
         return Chosen(tuple(subset.of(demonstrations)))
     known = [one for one in trained if one is not None]
