@@ -12,8 +12,8 @@ from navirl_cli.irl.status import Status
 FEW_DRAWS = 20
 _ENDED = {
     Status.CONVERGED: (
-        f"another draw moves the typical reward and the scatters by less than {AGREES:g} standard errors, and all draws "
-        f"leave an error of less than {PRECISE:g}"
+        f"another draw moves the typical reward and the scatters by less than {AGREES:g} standard errors, and all "
+        f"draws leave an error of less than {PRECISE:g}"
     ),
     Status.STOPPED_EARLY: (
         f"a draw still moves the typical reward or the scatters by more than {AGREES:g} standard errors, or all draws "
