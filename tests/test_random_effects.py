@@ -224,3 +224,13 @@ def test_a_spread_stays_near_another():
     found = Spread(np.array([5.0, 2.1]), np.array([0.11, 0.001])).near(other, (1.0, 0.7))
     assert found.mean == pytest.approx([1.1, 2.1])
     assert found.scatter == pytest.approx([0.11, 0.2 * np.exp(-0.7)])
+
+
+def test_between_far_nodes_the_stand_in_is_mended_as_under_a_wider_scatter():
+    person, spread = Lopsided(0.3, 5.0), Spread(np.array([1.0]), np.array([0.6]))
+    mode = laplace(person, spread, spread.mean)
+    known = replace(sampled([draw(Alone(person), mode, 16)], [mode], spread), least=0.15)
+    mean, covariance, log = known.moments(Spread(np.array([0.6]), np.array([0.01])))
+    assert log[0] == pytest.approx(person.value(np.array([0.6])), abs=0.02), "of people who are alike"
+    assert mean[0, 0] == pytest.approx(0.6, abs=1e-3)
+    assert covariance[0, 0, 0] == pytest.approx(1e-4, rel=0.02)

@@ -11,7 +11,7 @@ and Thompson 1971, Biometrika 58:545), which takes into account that m is estima
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cbrt, ceil
 
 import numpy as np
@@ -35,6 +35,8 @@ FLATTEST = 0.5
 SMALL = 0.2
 #: Nodes are drawn for a scatter so much wider than the one found, because the true one may be.
 WIDER = 1.5
+#: Share of a scatter below which nodes are too far from each other to say what a scatter of zero would.
+DENSE = 0.5
 #: The search has converged where another draw of nodes moves means and scatters by less than so many standard
 #: deviations, the nodes leave an error of less than so many, and at least so many places of the scatters count.
 AGREES, PRECISE, FEWEST_PLACES = 0.3, 0.1, 20.0
@@ -145,7 +147,7 @@ class _Search:
             mixture=mixture,
             spread=self.spread,
             people=tuple(posteriors),
-            differ=excluded(self._over(known), self.spread),
+            differ=excluded(self._over(replace(known, least=DENSE * self.spread.scatter)), self.spread),
             path=np.array([place for place, _ in self.places]),
             path_log_likelihood=np.array([value for _, value in self.places]),
             converged=converged,

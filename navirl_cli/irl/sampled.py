@@ -41,11 +41,16 @@ class Sampled:
     blocks: tuple[Shared, ...]
     #: Gaussian stand-ins for the likelihoods.
     factors: Factors
+    #: Scatter below which too few nodes are near each other: the errors of the stand-ins are those at this scatter, and
+    #: their influence falls with the prior's variance.
+    least: float | FloatArray = 0.0
 
     def moments(self, spread: Spread) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(n, v) posterior means, (n, v, v) covariances, and (n,) log integrals."""
         known_mean, known, known_log = self.factors.moments(spread)
-        (n, v), scatter = known_mean.shape, spread.scatter
+        (n, v), asked = known_mean.shape, spread
+        spread = Spread(asked.mean, np.maximum(asked.scatter, self.least))
+        scatter, smaller = spread.scatter, (asked.scatter / spread.scatter) ** 2
         mean, covariance, log = np.empty((2, n, v)), np.empty((2, n, v, v)), np.empty((2, n))
         for block, weight, top, prior, high, unit in self._under(spread):
             # All moments are one product of matrices: the prior is the same for all members.
@@ -60,11 +65,11 @@ class Sampled:
                 scatter, scatter
             )
             log[:, block.members] = top + high + np.log(total / len(unit))
-        better = covariance[0] - covariance[1] + known
+        better = (covariance[0] - covariance[1]) * np.outer(smaller, smaller) + known
         least = np.minimum(*(np.linalg.eigvalsh(one)[:, 0] for one in (covariance[0], known)))
         definite = np.linalg.eigvalsh(better)[:, 0] > DEFINITE * least
         return (
-            mean[0] - mean[1] + known_mean,
+            (mean[0] - mean[1]) * smaller + known_mean,
             np.where(definite[:, None, None], better, known),
             log[0] - log[1] + known_log,
         )
