@@ -22,7 +22,7 @@ from navirl_cli.demos.demonstration import Demonstration
 from navirl_cli.demos.grid import Grid
 from navirl_cli.irl.evidence import evidence_of
 from navirl_cli.irl.fit import fit
-from navirl_cli.irl.intervals import FEWEST_PARTICIPANTS, default_kind, intervals
+from navirl_cli.irl.intervals import default_kind, intervals
 from navirl_cli.irl.reward import Reward
 from navirl_cli.irl.scene import Scene
 from navirl_cli.irl.status import Status
@@ -119,8 +119,8 @@ def rows(count: int) -> list[Row]:
 def _rows(head: str, people: int, done: Sequence[Covered]) -> list[Row]:
     slack = 2 * 100 * np.sqrt(0.05 * 0.95 / len(done))
     low, high = BAR[0] - slack, min(100.0, BAR[1] + slack)
-    # A few people have one set, that of one person. Fewer than ten demonstrations or people are called approximate.
-    sets = [("as if one person", "front", False)] if people < FEWEST_PARTICIPANTS else [
+    # Fewer than ten demonstrations or people are called approximate.
+    sets = [("as if one person", "front", False)] if people == 1 else [
         ("by participant", "front", people >= 10),
         ("as if one person", "behind", False),
     ]  # fmt: skip

@@ -72,6 +72,12 @@ def test_wrong_values_are_refused_as_on_the_command_line(navirl):
     assert "navirl.toml" not in navirl("select", "a.json", "-o", "b.json", "--cycle", "two", code=2).stderr
 
 
+def test_config_refuses_what_a_command_would_refuse(navirl):
+    Path("navirl.toml").write_text('[extract]\nrobot-radius = "wide"\n')
+    told = navirl("config", ".", code=1).stderr
+    assert "navirl.toml: robot-radius: 'wide' is not a valid number" in told
+
+
 def test_quiet_leaves_out_remarks_and_verbose_adds_lines(navirl):
     ones = [make.demonstration(make.open_grid(8, 4), CELLS, number=number, cycle=number) for number in (1, 2)]
     write_json(Path("a.json"), "demonstrations", demonstrations_document(ones, [], {}), force=False)

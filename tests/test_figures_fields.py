@@ -54,8 +54,10 @@ def test_contours_have_numbers_and_people_hide_the_colours_below_them():
     numbers = [number.get_text() for number in drawn.numbers]
     assert len(set(numbers)) >= 3
     assert set(numbers) <= set(levels)
-    low, high = drawn.axes.get_ylim()
-    assert all(low < number.get_position()[1] < high for number in drawn.numbers)
+    for axis, (low, high) in enumerate((drawn.axes.get_xlim(), drawn.axes.get_ylim())):
+        shares = [(number.get_position()[axis] - low) / (high - low) for number in drawn.numbers]
+        assert 0.04 < min(shares) < max(shares) < 0.96, "the frame cuts no number"
+    assert set(drawn.numbers) == {text for text in drawn.axes.texts if text.get_text() in levels}
     (outline,) = drawn.people
     filled = [patch for patch in drawn.axes.patches if patch.center == outline.center and patch.get_fill()]
     assert to_hex(filled[0].get_facecolor()) == LOOKS["paper"].person.lower()

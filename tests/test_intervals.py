@@ -169,6 +169,9 @@ def test_participants_widen_by_student_and_by_their_scatter(evidence, found):
     front, _ = intervals(evidence, several, Kind.PROFILE)
     fall = best_at(evidence, "c0", front.ends[0].lower) - found.objective
     assert fall == pytest.approx(-(3.182446**2) / 2 * 4.0, rel=0.02)
+    front, behind = intervals(evidence, replace(several, participants=2), Kind.WALD)
+    assert (front.errors, behind.errors) == (Errors.PARTICIPANT, Errors.MODEL)
+    assert (front.ends[0].upper - front.ends[0].lower) / 2 == pytest.approx(12.706205 * np.sqrt(clustered[0, 0]))
 
 
 def test_a_scatter_that_is_too_small_by_chance_does_not_narrow_a_profile(evidence, found):

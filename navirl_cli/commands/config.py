@@ -60,11 +60,21 @@ def _rows(experiment: Any) -> Iterator[tuple[str, str, str, str]]:
                 continue
             name = max(option.opts, key=len).removeprefix("--")
             if option.name in values:
+                _check(command, option, values[option.name], experiment)
                 yield " ".join(own), name, _shown(values[option.name]), NAME
             elif name in CONSTANTS and own == ("extract",):
                 default = option.to_info_dict()["default"]
                 text = _shown(default)
                 yield " ".join(own), name, text, _DEFAULT if text else _UNSET
+
+
+def _check(command: click.Command, option: click.Option, value: Any, experiment: Any) -> None:
+    """Refuse a value that the command would refuse."""
+    try:
+        option.type_cast_value(click.Context(command), value)
+    except click.BadParameter as error:
+        name = max(option.opts, key=len).removeprefix("--")
+        raise ArtefactError(f"{experiment.path}: {name}: {error.message}") from None
 
 
 def _shown(value: Any) -> str:

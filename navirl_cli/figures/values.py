@@ -32,6 +32,8 @@ from navirl_cli.irl.scene import Scene
 VALUE_MAP = LinearSegmentedColormap.from_list("value", colormaps["YlGnBu_r"](np.linspace(0.35, 1.0, 256)))
 #: Largest number of contour lines, and size of their numbers, points.
 _CONTOURS, _NUMBER_PT = 10, 5.5
+#: Numbers nearer to the frame than this share of the map are left out: it would cut them.
+_MARGIN = 0.04
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,14 @@ def draw_value(axes: Axes, scene: Scene, value: FloatArray, **options: Unpack[Ce
     bar.add_lines(contours)
     # Before the view is set: numbers of lines that leave it are at places inside.
     frame(axes, window)
-    numbers = list(axes.clabel(contours, fmt=_number, fontsize=_NUMBER_PT, colors=INK, inline_spacing=2, zorder=3.6))
-    for number in numbers:
+    placed = axes.clabel(contours, fmt=_number, fontsize=_NUMBER_PT, colors=INK, inline_spacing=2, zorder=3.6)
+    numbers = []
+    for number in placed:
+        inside = axes.transAxes.inverted().transform(axes.transData.transform(number.get_position()))
+        if not (inside.min() > _MARGIN and inside.max() < 1 - _MARGIN):
+            number.remove()  # the frame would cut it
+            continue
+        numbers.append(number)
         number.set_path_effects([withStroke(linewidth=1.2, foreground=VALUE_MAP(0.9))])
     options["opaque_people"] = True
     drawn = draw_scene(image, bar, scene, window, **options)

@@ -22,8 +22,6 @@ from navirl_cli.irl.terms.term import Parameter
 #: With fewer demonstrations the likelihood is too far from a parabola for standard errors.
 FEW_DEMONSTRATIONS = 10
 LEVEL = 0.95
-#: With fewer participants the scatter between them says too little for an interval: Student's quantile is 4.3 and more.
-FEWEST_PARTICIPANTS = 4
 
 
 class Kind(StrEnum):
@@ -147,9 +145,8 @@ def quantile(found: Fit, errors: Errors) -> float:
 
 
 def _errors(found: Fit) -> list[Errors]:
-    """By participant first, where there are enough of them."""
-    few = found.clustered is None or found.participants < FEWEST_PARTICIPANTS
-    return [Errors.MODEL] if few else [Errors.PARTICIPANT, Errors.MODEL]
+    """By participant first, where there are several."""
+    return [Errors.MODEL] if found.clustered is None else [Errors.PARTICIPANT, Errors.MODEL]
 
 
 def _numbers(found: Fit) -> list[int]:

@@ -129,13 +129,14 @@ def report_of(study: Study, context: StudyContext) -> Report:
 
 
 def overview_of(study: Study, context: StudyContext) -> list[Block]:
-    """What the command prints: the learnt rewards and the verdicts.
+    """What the command prints: the learnt rewards, their intervals and the verdicts.
 
     Args:
         study: The numbers.
         context: What else the report states.
     """
-    blocks: list[Block] = [rewards_table(study), Bullets(tuple(_claims_lines(study.claims)))]
+    claims = Bullets(tuple(_claims_lines(study.claims)))
+    blocks: list[Block] = [rewards_table(study), intervals_table(study), claims]
     if context.cells:
         same = sum(same for _, same in context.cells)
         blocks.append(Paragraph(f"cells as published: {same} of {counted(len(context.cells), 'path')}"))
