@@ -155,7 +155,7 @@ def roughness(method: str, errors: str, participants: int, demonstrations: int) 
     several = 1 < participants < FEW
     if method == "posterior":
         few = f" {participants} participants say little about how people differ." if several else ""
-        return f"Approximate: in simulations 81 to 92 % of such intervals covered, rather than 95 %.{few}"
+        return f"Approximate: in simulations 91 to 94 % of such intervals covered, rather than 95 %.{few}"
     if errors == "participant" and participants < FEW:
         return (
             f"Approximate, too wide rather than too narrow: {participants} participants say little about how people "
