@@ -104,7 +104,8 @@ def test_an_interrupt_keeps_what_is_finished(logs, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(many, "as_completed", interrupted)
-    assert "interrupted" in run("extract", logs, "-o", f"{tmp_path / 'demos'}/", "--workers", 1, code=130)
+    said = run("extract", logs, "-o", f"{tmp_path / 'demos'}/", "--workers", 1, code=130)
+    assert said.endswith("navirl: 1 log done and kept: the same command goes on with the rest\nnavirl: interrupted\n")
     entries = read_manifest(tmp_path / "demos")
     assert [one.log for one in entries] == ["log0000.mcap"]
     assert len(read_demonstrations(tmp_path / "demos")) == 7

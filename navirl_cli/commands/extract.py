@@ -40,6 +40,7 @@ from navirl_cli.demos.rasterize import Rule
 from navirl_cli.demos.recordings import check_no_wrench, extract_recordings
 from navirl_cli.demos.trials import Split
 from navirl_cli.documents.text import to_text
+from navirl_cli.errors import counted
 from navirl_cli.files import Input
 from navirl_cli.logs.load import Forces, LoadOptions
 from navirl_cli.logs.map_file import read_map
@@ -301,10 +302,14 @@ def _into_folder(
 ) -> None:
     """Write a file a log to a folder, and say what became of the logs."""
     folder = Folder(path, asked.settings, asked.options, asked.said, asked.files)
-    with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
-        entries = folder.extract(
-            asked.logs, labels=asked.labels, join=asked.join, force=force, executor=executor, progress=update
-        )
+    try:
+        with workers_of(workers, cluster) as executor, bytes_bar("extract") as update:
+            entries = folder.extract(
+                asked.logs, labels=asked.labels, join=asked.join, force=force, executor=executor, progress=update
+            )
+    except KeyboardInterrupt:
+        say(f"{counted(len(folder.entries), 'log')} done and kept: the same command goes on with the rest")
+        raise
     check_some(entries)
     if as_json:
         echo_json({"logs": [asdict(one) for one in entries], "unchanged": folder.unchanged})
