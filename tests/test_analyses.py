@@ -77,12 +77,12 @@ def test_a_failed_analysis_keeps_the_fit_and_the_other_analyses(evidence, monkey
 def test_intervals_belong_to_every_fit_and_open_ones_to_its_status(evidence):
     plain = fit(evidence, TRUTH)
     found, analyses, _ = answers(evidence, plain, Questions())
-    assert [one.errors for one in analyses.intervals] == [Errors.MODEL], "two participants"
+    assert [one.errors for one in analyses.intervals] == [Errors.PARTICIPANT, Errors.MODEL], "two participants"
     assert analyses.intervals[0].kind is Kind.PROFILE, "eight demonstrations"
     assert (found.status is Status.OPEN_INTERVAL) == analyses.intervals[0].is_open
     for kind in (Kind.WALD, Kind.NONE):
         _, analyses, _ = answers(evidence, plain, Questions(intervals=kind))
-        assert [one.kind for one in analyses.intervals] == ([kind] if kind is Kind.WALD else [])
+        assert [one.kind for one in analyses.intervals] == ([kind] * 2 if kind is Kind.WALD else [])
 
 
 def test_the_expected_bias_is_known_for_whole_paths_that_were_not_corrected(evidence):

@@ -101,7 +101,7 @@ class Witness:
 
 
 @dataclass(frozen=True, eq=False)
-class Company(ByContent):
+class Company:
     """What the demonstrations of several people in the same scenes say: one policy a scene serves all."""
 
     #: (k,) numbers of the people, and of (demonstrations,) each the person, as a place among these; -1 for others.
