@@ -62,10 +62,25 @@ def test_an_end_takes_few_evaluations_of_the_likelihood(evidence, found, monkeyp
 
     monkeypatch.setattr(module, "Objective", Counted)
     intervals(evidence, found, Kind.PROFILE)
-    begun = made[0].evaluations
+    begun = sum(one.evaluations for one in made)
+    made.clear()
     intervals(evidence, replace(found, scanned=()), Kind.PROFILE)
     assert len(found.scanned) > 8
-    assert begun < made[1].evaluations < 60, "8 ends and the profile; the scan of the fit spares a part"
+    again = sum(one.evaluations for one in made)
+    assert begun + 10 < again < 60, "8 ends and the profile; the scan of the fit spares a part"
+
+
+def test_the_places_of_a_scan_without_the_regulariser_are_evaluated_already(evidence):
+    regularised = fit(evidence, START, 0.5)
+    here = Objective.of(evidence, regularised.reward, 0.5, None)
+    plain = Objective.of(evidence, regularised.reward, 0.0, None)
+    places = module._unregularised(regularised, here)
+    assert len(places) > 8
+    for place in places:
+        there = plain(place.x)
+        assert place.value == pytest.approx(there.value, abs=1e-9)
+        assert place.gradient == pytest.approx(there.gradient, abs=1e-7)
+        assert place.hessian == pytest.approx(there.hessian, rel=1e-9, abs=1e-7)
 
 
 class Twin:

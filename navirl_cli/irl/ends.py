@@ -7,6 +7,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from navirl_cli.arrays import FloatArray
 from navirl_cli.irl.evidence import Evidence
 from navirl_cli.irl.fit import PAPER_L2, Fit
 from navirl_cli.irl.newton import Effort, Maximum, Point, maximise, moved
@@ -70,10 +71,16 @@ class Profiler:
         if l2 != found.l2:  # without the regulariser the maximum is a little elsewhere
             top = climbed(estimate)
         known = [_known(objective.place(top))]
+        begun = _unregularised(found, Objective.of(evidence, found.reward, found.l2 - l2, found.prior))
+        evaluated = {place.x.tobytes(): place for place in begun}
+
+        def remembered(x: FloatArray) -> Point:
+            return evaluated.get(x.tobytes()) or plain(x)
+
         along: dict[int, list[Point]] = {}
         for j, values in plain.scans():
             if free[j]:
-                scan = Scan(plain, plain.bounds, free, None, known, most, found.scanned)
+                scan = Scan(remembered, plain.bounds, free, None, known, most, begun)
                 scan.follow(j, values)
                 along[j] = scan.places  # those that are not of interest too: others begin there
         seen = [top, estimate, *(objective.point(place) for places in along.values() for place in places)]
@@ -262,3 +269,17 @@ def _least_fall(place: Point, j: int, step: float, others: NDArray[np.bool_]) ->
 
 def _known(point: Point) -> Maximum:
     return Maximum(point, True, False, point.x[None], np.array([point.value]))
+
+
+def _unregularised(found: Fit, regularised: Objective) -> list[Point]:
+    """The places of a fit's scan without the regulariser of an objective; this needs no evaluation."""
+    scale, regulariser = regularised.scale, regularised.regulariser
+    return [
+        Point(
+            place.x,
+            place.value - regulariser.log_density(place.x * scale),
+            place.gradient - regulariser.gradient(place.x * scale) * scale,
+            place.hessian + regulariser.precision * np.outer(scale, scale),
+        )
+        for place in found.scanned
+    ]
