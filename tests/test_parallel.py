@@ -1,12 +1,16 @@
 """The same results through every executor, also when a process is killed."""
 
+import ctypes
+import platform
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from jobs import double, killed, raising_at_three, share
 
 from navirl_cli.errors import ArgumentError, MissingPackageError, WorkerLostError
-from navirl_cli.parallel import Local, as_completed, cores, map_in_order
+from navirl_cli.parallel import Local, as_completed, cores, keep_freed_memory, map_in_order
 
 
 @pytest.mark.parametrize("executor", [None, Local(1), Local(2), ThreadPoolExecutor(3)])
@@ -46,3 +50,28 @@ def test_dask_that_is_not_installed_is_named_with_its_remedy(monkeypatch):
         pass
     with pytest.raises(ArgumentError, match="`workers` and `cluster` exclude each other"), workers_of(2, "x"):
         pass
+
+
+FAULTS = """
+import resource, sys
+import numpy as np
+from navirl_cli.parallel import keep_freed_memory
+if sys.argv[1] == "kept":
+    keep_freed_memory()
+for _ in range(200):
+    held = [np.ones(500_000) for _ in range(8)]
+    del held
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library than glibc")
+def test_freed_memory_is_kept_for_the_next_arrays():
+    words = [sys.executable, "-c", FAULTS]
+    given, kept = (int(subprocess.check_output([*words, how])) for how in ("given", "kept"))
+    assert kept < given / 10
+
+
+def test_another_c_library_is_left_alone(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda _name: object())
+    keep_freed_memory()

@@ -44,6 +44,7 @@ from navirl_cli.irl.prior import Prior
 from navirl_cli.irl.reward import Reward, starting
 from navirl_cli.irl.selection import Steps, of_participant, select
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.parallel import keep_freed_memory
 from navirl_cli.reports.evidence import reach_unused
 from navirl_cli.reports.fit import report
 from navirl_cli.reports.fit_remarks import cannot_learn, remarks, warnings
@@ -195,6 +196,7 @@ def fit(
     for line in cannot_learn(chosen):
         say(line)
     prior = None if earlier is None else earlier.as_prior(person)
+    keep_freed_memory()
     with workers_of(workers, cluster) as executor:
         with evidence.kept_by(executor) as kept:
             plain = _learn(kept, start, prior, l2, Method(method))

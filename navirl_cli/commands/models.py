@@ -24,6 +24,7 @@ from navirl_cli.errors import counted
 from navirl_cli.irl.models import MODELS, compare_models, with_paper
 from navirl_cli.irl.selection import Steps, select
 from navirl_cli.irl.terms.term import Term
+from navirl_cli.parallel import keep_freed_memory
 from navirl_cli.reports.fit_remarks import cannot_learn
 from navirl_cli.reports.models import models_document, models_lost, models_remarks, models_report
 
@@ -85,6 +86,7 @@ def models(
     each = len(selected.evidence.several_people("models")) + 1
     say(f"{counted(len(chosen), 'model')}, each fitted {each} times: to all participants, and to all but each")
     bar = progress_bar("fit", each * len(chosen), line_every=each)
+    keep_freed_memory()
     with workers_of(workers, cluster) as executor, bar as update:
         found = compare_models(selected.evidence, chosen, l2, executor=executor, progress=update)
     if as_json:

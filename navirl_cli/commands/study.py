@@ -43,6 +43,7 @@ from navirl_cli.errors import ArtefactError
 from navirl_cli.files import MANIFEST, Input, check_writable, replacing, swapped_folder
 from navirl_cli.irl.selection import whole
 from navirl_cli.logs.load import Forces, LoadOptions
+from navirl_cli.parallel import keep_freed_memory
 from navirl_cli.remote import Remote
 
 if TYPE_CHECKING:
@@ -192,6 +193,7 @@ def _fitted(given: _Given, samples: int, seed: int, terms: tuple["Term", ...], e
     from navirl_cli.study.learning import people_of
     from navirl_cli.study.pipeline import study_of
 
+    keep_freed_memory()
     with progress_bar("fit", len(people_of(given.demonstrations)) + 1, line_every=1) as update:
         return study_of(
             given.demonstrations,
