@@ -116,12 +116,11 @@ def study(
     with workers_of(workers, cluster) as executor, swapped_folder(output) as folder, TemporaryDirectory() as screens:
         (folder / "figures").mkdir()
         given = _given(logs, LoadOptions(topics=topics_by_role(topics), forces=Forces.OPTIONAL), executor)
-        demonstrations = given.demonstrations
-        found = _fitted(given, samples, seed, terms, executor)
+        found, demonstrations = _fitted(given, samples, seed, terms, executor), given.demonstrations
         inputs = [*given.inputs, *map(Input.of, filter(None, [questionnaire]))]
         settings = {"samples": samples, "seed": seed, "levels": levels, "terms": names_of(found.terms)}
-        numbers = study_document(found, given.cells, bars)
-        document = {"inputs": [vars(one) for one in inputs], "settings": settings, **numbers}
+        document = {"inputs": [vars(one) for one in inputs], "settings": settings}
+        document |= study_document(found, given.cells, bars)
         write_json(folder / SUMMARY, "study", document, force=force)
         kept = demonstrations_document(demonstrations, inputs, asdict(ExtractSettings()))
         write_json(folder / DEMOS, "demonstrations", kept, force=force)
